@@ -22,7 +22,7 @@ const TRACK: &str = "[track]\nlength_m = 40000\ngradient = [[0.0, 0.0], [3000.0,
 const STEP_S: f64 = 0.5;
 const RUNS: usize = 4;
 
-/// Traction and brake force in N of a run after some steps: pulled, coasting and braked in turn.
+/// Returns the traction and brake force in N of a run after some steps: pulled, coasting and braked in turn.
 fn forces_n(number: usize, step: u32) -> [f64; 2] {
     let lap_s = 200.0 + 10.0 * number as f64;
     match STEP_S * f64::from(step) % lap_s {
@@ -32,7 +32,7 @@ fn forces_n(number: usize, step: u32) -> [f64; 2] {
     }
 }
 
-/// A run of a train, with a speed sensor that errs by 2 cm/s.
+/// Returns a run of a train, with a speed sensor that errs by 2 cm/s.
 fn run(train: &str, number: usize) -> String {
     let train = Arc::new(parse_train("train.toml", train).unwrap());
     let track = Arc::new(parse_track("track.toml", TRACK).unwrap());

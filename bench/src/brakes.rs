@@ -1,4 +1,4 @@
-//! How exact the model of brake components is, and how many plain draws its tilted ones are worth.
+//! Accuracy of the model of brake components, and the number of plain draws that its tilted ones are worth.
 
 use std::time::Instant;
 

@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 pub struct Chance(ChaCha8Rng);
 
 impl Chance {
-    /// The source of a seed.
+    /// Returns the source of a seed.
     pub fn new(seed: u64) -> Self {
         Chance(ChaCha8Rng::seed_from_u64(seed))
     }
@@ -25,7 +25,7 @@ impl Chance {
         2.0 * self.uniform() - 1.0
     }
 
-    /// Standard normal.
+    /// Returns the standard normal.
     pub fn normal(&mut self) -> f64 {
         let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
         radius * (std::f64::consts::TAU * self.uniform()).cos()
@@ -36,7 +36,7 @@ impl Chance {
         if self.0.random() { 1.0 } else { -1.0 }
     }
 
-    /// A whole number of a range.
+    /// Returns a whole number of a range.
     pub fn within<T: SampleUniform>(&mut self, range: impl SampleRange<T>) -> T {
         self.0.random_range(range)
     }

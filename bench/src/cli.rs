@@ -44,7 +44,7 @@ enum Command {
     Peer(PeerArguments),
 }
 
-/// The command line of `dynocar-bench`.
+/// Returns the command line of `dynocar-bench`.
 pub fn command() -> clap::Command {
     Arguments::command()
 }

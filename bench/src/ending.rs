@@ -1,5 +1,5 @@
-//! Ctrl-C: a command finishes what it has in hand, gives what it has, and ends with [`STATUS`]; a second one
-//! ends it at once.
+//! Ctrl-C: a command finishes its present work, gives its results so far, and ends with [`STATUS`]; a second one ends
+//! it at once.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};

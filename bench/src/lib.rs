@@ -1,15 +1,15 @@
 //! The measurements behind every figure that Dynocar's documents state.
 //!
 //! - [`cli`]: the commands of `dynocar-bench`
-//! - `drive`: what an automatic driver gains
+//! - `drive`: the gain of an automatic driver
 //! - `ending`: Ctrl-C, in every command
 //! - `estimators`: time of an update of every estimator and pipeline
 //! - `explain`: the search for undeclared effects on simulated datasets
 //! - `latency`: sample → snapshot through real processes, compared with the floor and alternatives
 //! - `load`: many trains against one daemon
-//! - `open_loop`: what the two measure by
+//! - `open_loop`: the open loop of the two
 //! - `rig`: processes, cores, pipelines and histograms
-//! - `monitor`: what the residual monitor suspects on simulated driving, how soon and how wrongly
+//! - `monitor`: suspicions of the residual monitor on simulated driving, their delay and false alarms
 //! - `papers`: accuracy of every estimator over seeded runs, compared with the statistical bound
 //! - [`scenarios`](mod@scenarios): resistance and mass in a user's day
 //! - `survey`: how the work of a survey grows with passes

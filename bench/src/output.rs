@@ -39,7 +39,7 @@ pub fn named<T: Copy>(option: &str, name: &str, all: &[(&str, T)]) -> Result<T, 
     })
 }
 
-/// Those of all whose name contains a text.
+/// Returns those of all whose name contains a text.
 ///
 /// # Errors
 ///
@@ -143,7 +143,7 @@ impl Record {
         self.shown(name, known.map_or(String::new(), |it| format!("{it:.decimals$}")), known)
     }
 
-    /// The number in a column, as machines get it.
+    /// Returns the number in a column, as machines get it.
     pub fn value(&self, name: &str) -> Option<f64> {
         self.0.iter().find(|it| it.name == name)?.value.as_f64()
     }
@@ -185,13 +185,13 @@ impl Serialize for Record {
     }
 }
 
-/// How often things came, in words.
+/// Returns how often things came, in words.
 pub fn counts<K: Display>(of: &BTreeMap<K, usize>) -> String {
     of.iter().map(|(it, count)| format!("{it} {count}")).collect::<Vec<_>>().join(", ")
 }
 
-/// Rows with the same columns as a table of Markdown that reads in a terminal too: words to the left, numbers
-/// to the right.
+/// Returns the rows with the same columns as a table of Markdown that reads in a terminal too: words to the left,
+/// numbers to the right.
 pub fn table(records: &[Record]) -> String {
     let rows: Vec<_> = records.iter().map(Record::for_people).collect();
     let Some(first) = rows.first() else { return String::new() };

@@ -18,7 +18,7 @@ pub fn over<C: Sync, R: Send>(
     over_while(cases, threads, work, || true)
 }
 
-/// The same with the first of the cases, until the command is to end.
+/// Returns the same with the first of the cases, until the command is to end.
 ///
 /// # Panics
 ///

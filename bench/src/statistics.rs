@@ -15,12 +15,12 @@ pub fn mean(values: impl IntoIterator<Item: Borrow<f64>>) -> f64 {
     if count == 0 { 0.0 } else { sum / f64::from(count) }
 }
 
-/// Share of what is so; 0 of none.
+/// Returns the share of what is so; 0 of none.
 pub fn share(are_so: impl IntoIterator<Item = bool>) -> f64 {
     mean(are_so.into_iter().map(|is_so| f64::from(u8::from(is_so))))
 }
 
-/// Root mean square; 0 of none.
+/// Returns the root mean square; 0 of none.
 pub fn root_mean_square(values: impl IntoIterator<Item: Borrow<f64>>) -> f64 {
     mean(values.into_iter().map(|value| value.borrow() * value.borrow())).sqrt()
 }
@@ -32,12 +32,12 @@ pub fn quantiles<const N: usize>(mut values: Vec<f64>, shares: [f64; N]) -> Opti
     Some(shares.map(|share| values[(share * last).round() as usize]))
 }
 
-/// The middle of some values, of two the greater one; none of none.
+/// Returns the middle of some values, of two the greater one; none of none.
 pub fn median(values: Vec<f64>) -> Option<f64> {
     quantiles(values, [0.5]).map(|[middle]| middle)
 }
 
-/// A straight line through some points, by least squares: its value at 0, and its slope.
+/// Returns a straight line through some points, by least squares: its value at 0, and its slope.
 pub fn straight_line(points: &[(f64, f64)]) -> (f64, f64) {
     let (mean_x, mean_y) = (mean(points.iter().map(|it| it.0)), mean(points.iter().map(|it| it.1)));
     let spread: f64 = points.iter().map(|it| (it.0 - mean_x).powi(2)).sum();

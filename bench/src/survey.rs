@@ -1,4 +1,4 @@
-//! How the work of a survey grows with the number of passes.
+//! Growth of the work of a survey with the number of passes.
 
 use std::path::PathBuf;
 use std::time::Instant;

@@ -24,7 +24,7 @@ fn built_in_force_n(speed_mps: f64) -> f64 {
     (a + speed_mps * (b + speed_mps * c)) * MASS_KG * STANDARD_GRAVITY_MPS2 / 1000.0
 }
 
-/// Resistance in N, where it comes from, and why.
+/// Returns the resistance in N, where it comes from, and why.
 fn resistance(reader: &SnapshotReader, speed_mps: f64) -> (f64, [&'static str; 2]) {
     let answer = reader.resistance(monotonic_now_ns());
     if let Ok(reading) = &answer

@@ -38,7 +38,7 @@ struct Parameters {
 }
 
 impl Parameters {
-    /// Force in N, braking negative, for an acceleration in m/s² on the level.
+    /// Returns the force in N, braking negative, for an acceleration in m/s² on the level.
     fn force_n(&self, acceleration_mps2: f64, speed_mps: f64) -> f64 {
         let [a, b, c] = self.davis;
         let w0_n_per_kn = a + speed_mps * (b + speed_mps * c);
@@ -46,7 +46,7 @@ impl Parameters {
         self.mass_kg * (1.0 + ROTATING_MASS_FACTOR) * acceleration_mps2 + resistance_n
     }
 
-    /// Acceleration in m/s² under a force in N.
+    /// Returns the acceleration in m/s² under a force in N.
     fn acceleration_mps2(&self, force_n: f64, speed_mps: f64) -> f64 {
         let free_n = force_n - self.force_n(0.0, speed_mps);
         free_n / (self.mass_kg * (1.0 + ROTATING_MASS_FACTOR))
@@ -101,7 +101,7 @@ fn predicted_s(coast_from_m: f64, known: &Parameters) -> f64 {
     time_s
 }
 
-/// The first place in m from which coasting still keeps the timetable, by what is known.
+/// Returns the first place in m from which coasting still keeps the timetable, by what is known.
 fn coasting_place_m(known: &Parameters) -> f64 {
     let (mut early_m, mut late_m) = (0.1 * LEG_M, LEG_M);
     for _ in 0..20 {

@@ -33,7 +33,7 @@
 //!
 //! - [`publisher`], [`reader`]: the two ends a controller holds
 //! - [`ffi`]: the same for C and C++
-//! - what both stand on is the package `dynocar-transport`
+//! - their common base is the package `dynocar-transport`
 
 pub mod ffi;
 pub mod publisher;

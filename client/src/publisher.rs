@@ -124,7 +124,7 @@ impl SamplePublisher {
         Ok(self.sequence)
     }
 
-    /// Number of samples that this publisher has published so far.
+    /// Returns the number of samples that this publisher has published so far.
     pub fn published(&self) -> u64 {
         self.sequence - self.start
     }
@@ -134,12 +134,12 @@ impl SamplePublisher {
         self.sequence
     }
 
-    /// Pipelines of the daemon that serves the train, or served it last.
+    /// Returns the pipelines of the daemon that serves the train, or served it last.
     pub fn pipelines(&self) -> usize {
         self.count.pipelines()
     }
 
-    /// Samples of the train, of this publisher or of one before it, that the slowest pipeline thread
+    /// Returns the samples of the train, of this publisher or of one before it, that the slowest pipeline thread
     /// has not taken; `None` where there never was one.
     pub fn untaken(&self) -> Option<u64> {
         self.count.untaken()

@@ -78,17 +78,17 @@ pub struct Reading<'a> {
 }
 
 impl Reading<'_> {
-    /// The estimate's status; invalid while the daemon is silent.
+    /// Returns the estimate's status; invalid while the daemon is silent.
     pub fn status(&self) -> Status {
         if self.is_stale { Status::Invalid } else { self.snapshot.status() }
     }
 
-    /// Why the status is what it is; `None` for a reason that a newer peer gives.
+    /// Returns why the status is what it is; `None` for a reason that a newer peer gives.
     pub fn reason(&self) -> Option<Reason> {
         if self.is_stale { Some(Reason::DaemonSilent) } else { self.snapshot.reason() }
     }
 
-    /// True when a controller may use the values for what it asked for; else it falls back to its own
+    /// Returns whether a controller may use the values for what it asked for; else it falls back to its own
     /// parameters. The daemon decides that, with hysteresis, so that a controller can switch on it: what
     /// it promises, and how late it is, stands in `docs/guides/reading.md`. Of a pipeline that was asked
     /// for by its kind, everything that it answers has to be usable.
@@ -162,7 +162,7 @@ impl SnapshotReader {
         news
     }
 
-    /// The newest snapshot of the pipeline that answers a quantity, by the daemon's configuration;
+    /// Returns the newest snapshot of the pipeline that answers a quantity, by the daemon's configuration;
     /// `now_ns` is the host's monotonic clock.
     ///
     /// # Errors
@@ -187,7 +187,7 @@ impl SnapshotReader {
         self.quantity(Quantity::Resistance, now_ns)
     }
 
-    /// Gross mass, parameter `Mass` in t; as [`Self::quantity`].
+    /// Returns the gross mass, parameter `Mass` in t; as [`Self::quantity`].
     ///
     /// # Errors
     ///
@@ -223,13 +223,13 @@ impl SnapshotReader {
         self.quantity(Quantity::BrakingRatio, now_ns)
     }
 
-    /// The newest snapshot of the first pipeline of a kind; `now_ns` is the host's monotonic
+    /// Returns the newest snapshot of the first pipeline of a kind; `now_ns` is the host's monotonic
     /// clock.
     pub fn latest(&self, kind: PipelineKind, now_ns: i64) -> Option<Reading<'_>> {
         self.readings(now_ns).find(|reading| reading.snapshot.pipeline_kind == kind as u32)
     }
 
-    /// The newest snapshot of every pipeline, by the pipeline's number in the configuration.
+    /// Returns the newest snapshot of every pipeline, by the pipeline's number in the configuration.
     pub fn readings(&self, now_ns: i64) -> impl Iterator<Item = Reading<'_>> {
         self.latest.iter().flatten().map(move |snapshot| self.reading(snapshot, None, now_ns))
     }
@@ -250,7 +250,7 @@ impl SnapshotReader {
         self.refused
     }
 
-    /// Who serves the train now. Opens a file: call it outside the control cycle.
+    /// Returns who serves the train now. Opens a file: call it outside the control cycle.
     ///
     /// # Errors
     ///
@@ -259,7 +259,7 @@ impl SnapshotReader {
         Peer::look_up(&self.host, self.train, Role::Daemon)
     }
 
-    /// True for what a daemon of ours may send: this train, numbers in range, nothing that is not
+    /// Returns true for what a daemon of ours may send: this train, numbers in range, nothing that is not
     /// finite, nothing vouched for in the future, which would never grow old.
     fn is_plausible(&self, it: &ParameterSnapshot) -> bool {
         let statistics = [
@@ -324,7 +324,7 @@ pub enum NoAnswer {
 }
 
 impl NoAnswer {
-    /// The reason's name, in addition to those of [`dynocar_shared::Reason`].
+    /// Returns the reason's name, in addition to those of [`dynocar_shared::Reason`].
     pub const fn name(self) -> &'static str {
         match self {
             NoAnswer::NoSnapshot => "no_snapshot",
@@ -360,7 +360,7 @@ impl Answers {
         }
     }
 
-    /// The number of the pipeline that answers a quantity.
+    /// Returns the number of the pipeline that answers a quantity.
     pub(crate) fn index(&self, quantity: Quantity) -> Result<usize, NoAnswer> {
         let is_provided = self.provided.is_none_or(|bits| bits & quantity.bit() != 0);
         let why = if is_provided { NoAnswer::NoSnapshot } else { NoAnswer::NotProvided };

@@ -40,13 +40,13 @@ pub struct SourceArguments {
 }
 
 impl SourceArguments {
-    /// The path with the train.
+    /// Returns the path with the train.
     pub fn source(&self) -> DatasetSource<'_> {
         DatasetSource { path: &self.dataset, train: self.train.map(TrainId) }
     }
 }
 
-/// True for the name of a file, or a folder of files, of Parquet.
+/// Returns true for the name of a file, or a folder of files, of Parquet.
 pub fn is_parquet_path(path: &Path) -> bool {
     path.extension().is_some_and(|it| it == "parquet")
 }
@@ -104,7 +104,7 @@ pub struct DatasetFolder {
 }
 
 impl DatasetFolder {
-    /// The dataset at a path: its folder, or its `dataset.toml`.
+    /// Returns the dataset at a path: its folder, or its `dataset.toml`.
     ///
     /// # Errors
     ///
@@ -131,7 +131,7 @@ impl DatasetFolder {
         Ok(DatasetFolder { folder, manifest: path.into() })
     }
 
-    /// Where a file lies that the dataset names.
+    /// Returns where a file lies that the dataset names.
     pub fn path_of(&self, path: &str) -> PathBuf {
         if path == MANIFEST_FILE { self.manifest.clone() } else { self.folder.join(path) }
     }
@@ -156,7 +156,7 @@ impl DatasetFiles for DatasetFolder {
     }
 }
 
-/// Which files of a folder describe a dataset under another name, in words; empty for none.
+/// Returns which files of a folder describe a dataset under another name, in words; empty for none.
 fn described(folder: &Path) -> String {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let mut names: Vec<String> = entries
@@ -185,7 +185,7 @@ pub fn open<'p>(
     Ok((folder, head))
 }
 
-/// The error of a file that is a train, a line or a configuration where a dataset is expected;
+/// Returns the error of a file that is a train, a line or a configuration where a dataset is expected;
 /// else the one that there was.
 fn other_kind(path: &Path, error: DatasetError) -> LoadError {
     let label = path.display().to_string();
@@ -260,7 +260,7 @@ pub fn load_track(path: &Path) -> Result<Track, LoadError> {
     Ok(parse_track(&label, &text)?)
 }
 
-/// A file's name in messages and its text.
+/// Returns a file's name in messages and its text.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! When a long-running program ends: it is asked to, or its terminal is gone.
+//! The end of a long-running program: by request, or since its terminal is gone.
 //!
 //! A closed terminal sends SIGHUP to the programs in its foreground and nothing to others that write on
 //! it; for those the terminal itself is watched. Whoever starts a program with SIGHUP ignored, as `nohup`
@@ -34,7 +34,7 @@ pub struct ProgramEnding {
     terminals: Arc<Vec<OwnedFd>>,
 }
 
-/// The flag alone, for a program that shows nothing on its terminal.
+/// Returns the flag alone, for a program that shows nothing on its terminal.
 ///
 /// # Errors
 ///
@@ -65,12 +65,12 @@ impl ProgramEnding {
         Ok(ProgramEnding { flag, terminals })
     }
 
-    /// True when the program is to end.
+    /// Returns whether the program is to end.
     pub fn is_due(&self) -> bool {
         self.flag.load(Ordering::Relaxed)
     }
 
-    /// True when the terminal is gone; a program that outlives it sees that here alone.
+    /// Returns whether the terminal is gone; a program that outlives it sees that here alone.
     pub fn is_terminal_gone(&self) -> bool {
         is_one_gone(&self.terminals, Some(&Timespec::default()))
     }
@@ -115,7 +115,7 @@ fn is_one_gone(terminals: &[OwnedFd], at_most: Option<&Timespec>) -> bool {
     }
 }
 
-/// True when SIGHUP was ignored from the start.
+/// Returns whether SIGHUP was ignored from the start.
 fn outlives_its_terminal() -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     is_ignored(&status, SIGHUP)

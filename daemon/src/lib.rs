@@ -8,8 +8,8 @@
 //! - [`ending`]: when a long-running program ends
 //! - [`log`]: the daemon's log, for which nobody waits
 //! - [`models`]: a store of models
-//! - [`observing`]: what an observer of trains sees, in one vocabulary
-//! - [`operator`]: what an operator reads, in one place
+//! - [`observing`]: observation of trains, in one vocabulary
+//! - [`operator`]: texts for an operator, in one place
 //! - [`output`]: where results go
 //! - [`pipelines`]: the pipelines that a configuration asks for
 //! - [`programs`]: commands that are programs of their own, and their failures
@@ -21,7 +21,7 @@
 //! - [`stamp`]: moments whose age no wall clock changes
 //! - [`state`]: estimates that outlive the daemon
 //! - [`storage`]: files that are replaced as a whole
-//! - [`supervision`]: what a supervisor and an operator see of the daemon
+//! - [`supervision`]: health and metrics of the daemon, for supervisors and operators
 //! - [`text_file`]: text files from disk
 //! - [`replay`]: recorded runs into the sample channel
 

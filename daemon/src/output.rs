@@ -1,4 +1,4 @@
-//! Where results go: standard output, standard error and files, for every program of the project.
+//! Destinations of results: standard output, standard error and files, for every program of the project.
 //!
 //! A reader that has gone away ends the printing and nothing else; a full disk is an error in words.
 //! A file is written beside and takes its name once it is whole, so that whenever the program ends
@@ -66,7 +66,7 @@ pub fn report_line(line: &str) {
     let _ = io::stderr().lock().write_all(format!("{line}\n").as_bytes());
 }
 
-/// True when `--json` is to go to standard output, where then nothing else may go.
+/// Returns whether `--json` is to go to standard output, where then nothing else may go.
 pub fn is_standard_output(file: &Path) -> bool {
     file == Path::new("-")
 }

@@ -16,7 +16,7 @@ pub struct SettingRefused {
     pub source: SettingError,
 }
 
-/// A pipeline of the configuration for one of its trains, before its first sample; `index` is its
+/// Returns a pipeline of the configuration for one of its trains, before its first sample; `index` is its
 /// number in the configuration.
 ///
 /// # Errors

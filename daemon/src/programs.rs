@@ -30,7 +30,7 @@ const PROGRAMS: [&str; 6] = [USUAL, WORKSHOP, RECORDING, WATCH, LIVE, BENCH];
 /// Name of the calling program that is usual.
 const USUAL: &str = "dynocar";
 
-/// A call of a program that lies where this one lies; else the search path has it. It bears the name
+/// Returns a call of a program that lies where this one lies; else the search path has it. It bears the name
 /// of the package that it is built from, with the ending of this one's: `dynocar-2` calls
 /// `dynocar-workshop-2`.
 pub fn call(package: &str) -> Command {
@@ -59,7 +59,7 @@ fn ending(file: &str) -> &str {
     endings.min_by_key(|ending| ending.len()).unwrap_or("")
 }
 
-/// Why a program does not start, in words.
+/// Returns why a program does not start, in words.
 pub fn not_started(package: &str, error: &io::Error) -> String {
     if error.kind() == io::ErrorKind::NotFound {
         return format!(

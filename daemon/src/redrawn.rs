@@ -8,7 +8,7 @@ use rustix::termios::tcgetwinsize;
 /// Columns of a terminal that does not say how many it has.
 const USUAL_COLUMNS: usize = 80;
 
-/// True where the terminal takes letters beyond ASCII, by its locale.
+/// Returns whether the terminal takes letters beyond ASCII, by its locale.
 pub fn is_utf8() -> bool {
     let named = |name| std::env::var(name).ok().filter(|it: &String| !it.is_empty());
     let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(named).unwrap_or_default();
@@ -16,7 +16,7 @@ pub fn is_utf8() -> bool {
     locale.contains("utf-8") || locale.contains("utf8")
 }
 
-/// True where lines can be written over, and boxes and bars drawn: not on a terminal that is called dumb.
+/// Returns whether lines can be written over, and boxes and bars drawn: not on a terminal that is called dumb.
 pub fn can_draw() -> bool {
     std::env::var("TERM").is_ok_and(|it| !it.is_empty() && it != "dumb") && is_utf8()
 }

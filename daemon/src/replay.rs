@@ -81,7 +81,7 @@ impl ReplayReport {
         }
     }
 
-    /// True when at least one pipeline used at least half of the samples.
+    /// Returns whether at least one pipeline used at least half of the samples.
     pub fn was_used(&self) -> bool {
         let used = self.snapshots.iter().map(|it| self.taken(it).used).max();
         2 * used.unwrap_or(0) >= self.published + self.refused
@@ -105,7 +105,7 @@ pub struct Replayer {
 }
 
 impl Replayer {
-    /// A replayer for a train's channel.
+    /// Returns a replayer for a train's channel.
     ///
     /// # Errors
     ///
@@ -142,7 +142,7 @@ impl Replayer {
         }
     }
 
-    /// True when as many pipelines answer as the daemon has.
+    /// Returns whether as many pipelines answer as the daemon has.
     fn all_answer(&mut self) -> bool {
         self.reader.poll();
         let now_ns = monotonic_now_ns();

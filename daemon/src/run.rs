@@ -214,7 +214,7 @@ fn plan_workers(
     Ok((plans, watched))
 }
 
-/// The trains whose models are tried, each with a way to the threads that serve it.
+/// Returns the trains whose models are tried, each with a way to the threads that serve it.
 fn plan_shadow(
     config: &DaemonConfig,
     plans: &mut [WorkerPlan],

@@ -174,7 +174,7 @@ pub struct StorageError {
 }
 
 impl StorageError {
-    /// True when the file was replaced, and only not brought to the disk for good.
+    /// Returns whether the file was replaced, and only not brought to the disk for good.
     pub fn is_replaced(&self) -> bool {
         self.action == TO_THE_DISK
     }
@@ -258,7 +258,7 @@ pub fn settle(storage: &(impl Storage + ?Sized), path: &Path) -> io::Result<()> 
     }
 }
 
-/// A name beside another that no other writer uses, of this process or any that lives.
+/// Returns a name beside another that no other writer uses, of this process or any that lives.
 pub fn part_of(path: &Path) -> PathBuf {
     static COUNT: AtomicU64 = AtomicU64::new(0);
     let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -284,7 +284,7 @@ fn write_next_to(
     storage.write_new(beside, content, rights).map_err(failed(beside, "writing"))
 }
 
-/// The directory that a file lies in.
+/// Returns the directory that a file lies in.
 pub fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }

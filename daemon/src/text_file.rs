@@ -26,7 +26,7 @@ fn irregular(kind: FileType) -> Option<&'static str> {
     kinds.into_iter().find(|(is_it, _)| *is_it).map(|(_, name)| name)
 }
 
-/// The format of a file that begins so and is no text in the encoding; `None` for what may be.
+/// Returns the format of a file that begins so and is no text in the encoding; `None` for what may be.
 fn other_format(head: &[u8], encoding: &'static Encoding) -> Option<&'static str> {
     if [UTF_16LE, UTF_16BE].contains(&encoding) {
         return None;

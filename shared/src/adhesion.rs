@@ -10,12 +10,12 @@ pub struct Uncertain {
 }
 
 impl Uncertain {
-    /// A value with its standard deviation.
+    /// Returns a value with its standard deviation.
     pub const fn new(value: f64, std: f64) -> Self {
         Uncertain { value, std }
     }
 
-    /// A value known exactly.
+    /// Returns a value known exactly.
     pub const fn exact(value: f64) -> Self {
         Uncertain { value, std: 0.0 }
     }

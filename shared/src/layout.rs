@@ -1,4 +1,4 @@
-//! How a shared-memory type describes its own bytes.
+//! Descriptions of the bytes of shared-memory types.
 //!
 //! [`wire_struct!`](crate::wire_struct) declares a `#[repr(C)]` struct, refuses padding at compile time, and gives
 //! the struct a `LAYOUT` (name, type, offset and size of each field) and a `LAYOUT_HASH` over
@@ -22,9 +22,9 @@ pub struct FieldLayout {
 ///
 /// A float's word holds its bits, an integer's its value, negative ones in two's complement.
 pub trait Words {
-    /// How many words.
+    /// Returns how many words.
     fn count(&self) -> usize;
-    /// A word by its place.
+    /// Returns a word by its place.
     ///
     /// # Panics
     ///
@@ -105,7 +105,7 @@ pub const fn layout_hash(struct_name: &str, size: usize, fields: &[FieldLayout])
     hash
 }
 
-/// True when the fields, in order, fill `size` bytes without a gap.
+/// Returns whether the fields, in order, fill `size` bytes without a gap.
 pub const fn is_without_padding(size: usize, fields: &[FieldLayout]) -> bool {
     let mut end = 0;
     let mut i = 0;
@@ -119,7 +119,7 @@ pub const fn is_without_padding(size: usize, fields: &[FieldLayout]) -> bool {
     end == size
 }
 
-/// The sixteen lower-case hexadecimal digits of a hash, for use inside a constant name.
+/// Returns the sixteen lower-case hexadecimal digits of a hash, for use inside a constant name.
 pub const fn hex_digits(hash: u64) -> [u8; 16] {
     let mut digits = [0u8; 16];
     let mut i = 0;
@@ -176,12 +176,12 @@ macro_rules! wire_struct {
                 }
             };
 
-            /// Every field by its place in `LAYOUT`.
+            /// Returns every field by its place in `LAYOUT`.
             pub fn fields(&self) -> [&dyn $crate::layout::Words; $name::LAYOUT.len()] {
                 [ $( &self.$field ),* ]
             }
 
-            /// Every field by its place in `LAYOUT`, to be set.
+            /// Returns every field by its place in `LAYOUT`, to be set.
             pub fn fields_mut(&mut self) -> [&mut dyn $crate::layout::Words; $name::LAYOUT.len()] {
                 [ $( &mut self.$field ),* ]
             }

@@ -7,14 +7,14 @@
 //! # Layout
 //!
 //! - [`layout`]: how a type describes its own bytes, and the hash both peers compare
-//! - [`sample`]: what the controller writes each cycle, [`TrainSample`]
+//! - [`sample`]: the sample of each control cycle, [`TrainSample`]
 //! - [`mod@vocabulary`]: pipelines, parameters, statuses, reasons, effects: the numbers on the wire
-//! - [`snapshot`]: what the daemon answers, [`ParameterSnapshot`]
+//! - [`snapshot`]: the daemon's answer, [`ParameterSnapshot`]
 //! - [`resistance`]: resistance at a speed, with its standard deviation, from a snapshot
 //! - [`adhesion`]: adhesion laws over speed
 //! - [`stopping`]: braking distance and time from a speed, with a bound
 //! - [`quantile`]: quantiles of the normal distribution
-//! - [`schema`]: what each field of sample and snapshot is, in which unit, and when it is missing
+//! - [`schema`]: meaning and unit of each field of sample and snapshot, and when it is missing
 //! - [`services`]: names, prefix and schema version of the channels; which pipeline threads want to be woken
 
 pub mod adhesion;

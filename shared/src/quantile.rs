@@ -3,7 +3,7 @@
 /// Half of a 95 % interval in standard deviations.
 pub const HALF_95: f64 = 1.96;
 
-/// The z with P(Z <= z) = `probability` for a standard normal Z.
+/// Returns the z with P(Z <= z) = `probability` for a standard normal Z.
 ///
 /// `None` unless 0 < `probability` < 1. Relative error below 1e-15 away from the median, after
 /// Wichura 1988, algorithm AS 241 (PPND16).

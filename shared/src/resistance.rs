@@ -26,7 +26,7 @@ pub struct ResistanceEstimate {
 }
 
 impl ResistanceEstimate {
-    /// Resistance in N and its standard deviation, for a train of `mass_kg`.
+    /// Returns the resistance in N and its standard deviation, for a train of `mass_kg`.
     pub fn force_n(&self, mass_kg: f64) -> (f64, f64) {
         let weight_kn = mass_kg * STANDARD_GRAVITY_MPS2 / 1000.0;
         (self.w0_n_per_kn * weight_kn, self.w0_std_n_per_kn * weight_kn)

@@ -33,17 +33,17 @@ macro_rules! measured {
             pub const ALL: [SampleField; [$( stringify!($item) ),*].len()] =
                 [ $( SampleField::$item ),* ];
 
-            /// The name of the sample's field.
+            /// Returns the name of the sample's field.
             pub const fn name(self) -> &'static str {
                 match self { $( SampleField::$item => stringify!($field) ),* }
             }
 
-            /// Least and greatest value that can be true of any train, in the field's unit.
+            /// Returns the least and greatest value that can be true of any train, in the field's unit.
             pub const fn range(self) -> (f64, f64) {
                 match self { $( SampleField::$item => ($low, $high) ),* }
             }
 
-            /// The field's bit in [`TrainSample::valid`].
+            /// Returns the field's bit in [`TrainSample::valid`].
             #[inline]
             pub const fn bit(self) -> u16 {
                 1 << self as u16
@@ -78,7 +78,7 @@ macro_rules! measured {
         }
 
         impl TrainSample {
-            /// A sample with no measured value.
+            /// Returns a sample with no measured value.
             pub const fn empty(train: TrainId) -> Self {
                 TrainSample {
                     time_ns: 0,
@@ -99,7 +99,7 @@ macro_rules! measured {
                 self.valid |= field.bit();
             }
 
-            /// The value of a field, when its validity bit is set.
+            /// Returns the value of a field, when its validity bit is set.
             #[inline]
             pub const fn get(&self, field: SampleField) -> Option<f64> {
                 if self.valid & field.bit() == 0 {

@@ -33,23 +33,23 @@ pub struct Field {
 }
 
 impl Field {
-    /// The unit; empty for a count, a number of a vocabulary or a ratio.
+    /// Returns the unit; empty for a count, a number of a vocabulary or a ratio.
     pub fn unit(&self) -> &'static str {
         unit_of(self.layout.name)
     }
 
-    /// The type of an entry, for an array; else its own.
+    /// Returns the type of an entry, for an array; else its own.
     pub fn entry_type(&self) -> &'static str {
         let name = self.layout.type_name;
         name.strip_prefix('[').and_then(|it| it.split(';').next()).unwrap_or(name)
     }
 
-    /// True for an array.
+    /// Returns true for an array.
     pub fn is_array(&self) -> bool {
         self.layout.type_name.starts_with('[')
     }
 
-    /// The type of an entry in NumPy's notation, as it lies in shared memory: `<f8` on most hosts.
+    /// Returns the type of an entry in NumPy's notation, as it lies in shared memory: `<f8` on most hosts.
     pub fn numpy_type(&self) -> String {
         let (kind, bits) = self.entry_type().split_at(1);
         let bytes = bits.parse().map_or(0, |bits: usize| bits / 8);
@@ -61,19 +61,19 @@ impl Field {
         format!("{order}{kind}{bytes}")
     }
 
-    /// How many entries there are; 1 unless it is an array.
+    /// Returns how many entries there are; 1 unless it is an array.
     pub fn entries(&self) -> usize {
         let count = self.layout.type_name.split_once("; ").map(|it| it.1.trim_end_matches(']'));
         count.map_or(1, |it| it.parse().unwrap_or(0))
     }
 }
 
-/// The fields of [`TrainSample`], in order.
+/// Returns the fields of [`TrainSample`], in order.
 pub fn sample_fields() -> impl Iterator<Item = Field> {
     table(TrainSample::LAYOUT, TrainSample::MEANINGS)
 }
 
-/// The fields of [`ParameterSnapshot`], in order.
+/// Returns the fields of [`ParameterSnapshot`], in order.
 pub fn snapshot_fields() -> impl Iterator<Item = Field> {
     table(ParameterSnapshot::LAYOUT, ParameterSnapshot::MEANINGS)
 }
@@ -112,18 +112,18 @@ const UNITS: [(&str, &str); 15] = [
     ("_t", "t"),
 ];
 
-/// The end of a name that says its unit, with the unit; both empty where there is none.
+/// Returns the end of a name that says its unit, with the unit; both empty where there is none.
 pub fn unit_end(name: &str) -> (&'static str, &'static str) {
     UNITS.into_iter().find(|(end, _)| name.ends_with(end)).unwrap_or(("", ""))
 }
 
-/// The unit that a name says; empty where it says none.
+/// Returns the unit that a name says; empty where it says none.
 pub fn unit_of(name: &str) -> &'static str {
     unit_end(name).1
 }
 
 impl Parameter {
-    /// The parameter's name with its unit, for a place where nothing else says them.
+    /// Returns the parameter's name with its unit, for a place where nothing else says them.
     pub const fn full_name(self) -> &'static str {
         match self {
             Parameter::DavisA => "resistance_a_n_per_kn",

@@ -38,7 +38,7 @@ pub enum Channel {
 }
 
 impl Channel {
-    /// The channel's part of the service name.
+    /// Returns the channel's part of the service name.
     pub const fn name(self) -> &'static str {
         match self {
             Channel::Samples => "samples",
@@ -79,7 +79,7 @@ wire_struct! {
 }
 
 impl SleeperState {
-    /// The listener's id in one number.
+    /// Returns the listener's id in one number.
     pub const fn listener(&self) -> u128 {
         (self.listener_high as u128) << 64 | self.listener_low as u128
     }

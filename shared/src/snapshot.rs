@@ -111,7 +111,7 @@ wire_struct! {
 }
 
 impl ParameterSnapshot {
-    /// A snapshot in which nothing has been estimated.
+    /// Returns a snapshot in which nothing has been estimated.
     pub const fn empty() -> Self {
         ParameterSnapshot {
             epoch: 0,
@@ -165,49 +165,49 @@ impl ParameterSnapshot {
         }
     }
 
-    /// Why the status is what it is.
+    /// Returns why the status is what it is.
     pub const fn reason(&self) -> Option<Reason> {
         Reason::from_number(self.reason)
     }
 
-    /// The estimator's kind.
+    /// Returns the estimator's kind.
     pub const fn pipeline_kind(&self) -> Option<PipelineKind> {
         PipelineKind::from_number(self.pipeline_kind)
     }
 
-    /// True when this pipeline answers a quantity for the train.
+    /// Returns whether this pipeline answers a quantity for the train.
     pub const fn answers(&self, quantity: Quantity) -> bool {
         self.quantities & quantity.bit() != 0
     }
 
-    /// True when a controller may use the values for a quantity, as the daemon wrote it.
+    /// Returns whether a controller may use the values for a quantity, as the daemon wrote it.
     pub const fn is_usable_for(&self, quantity: Quantity) -> bool {
         self.usable_quantities & quantity.bit() != 0 && !matches!(self.status(), Status::Invalid)
     }
 
-    /// Where the mass comes from; `None` for a number that a newer peer gives.
+    /// Returns where the mass comes from; `None` for a number that a newer peer gives.
     pub const fn mass_source(&self) -> Option<MassSource> {
         MassSource::from_number(self.mass_source)
     }
 
-    /// The effects that the data hardly distinguish from the suspected one.
+    /// Returns the effects that the data hardly distinguish from the suspected one.
     pub fn alternatives(&self) -> impl Iterator<Item = EffectKind> {
         let bits = self.suspected_alternatives;
         EffectKind::ALL.iter().copied().filter(move |kind| bits & kind.bit() != 0)
     }
 
-    /// Samples refused for one reason.
+    /// Returns the samples refused for one reason.
     pub const fn rejected(&self, reason: RejectionReason) -> u32 {
         self.rejected_by_reason[reason as usize]
     }
 
-    /// The index of a parameter among this snapshot's values.
+    /// Returns the index of a parameter among this snapshot's values.
     pub fn index_of(&self, parameter: Parameter) -> Option<usize> {
         let count = (self.parameter_count as usize).min(PARAMETERS_MAX);
         self.parameters[..count].iter().position(|&number| number == parameter as u32)
     }
 
-    /// A parameter's value in its unit.
+    /// Returns a parameter's value in its unit.
     ///
     /// # Examples
     ///
@@ -225,12 +225,12 @@ impl ParameterSnapshot {
         self.index_of(parameter).map(|index| self.values[index])
     }
 
-    /// A parameter's standard deviation in its unit.
+    /// Returns a parameter's standard deviation in its unit.
     pub fn std(&self, parameter: Parameter) -> Option<f64> {
         self.index_of(parameter).map(|index| self.covariance_at(index, index).max(0.0).sqrt())
     }
 
-    /// Covariance of the values at two places.
+    /// Returns the covariance of the values at two places.
     ///
     /// # Panics
     ///
@@ -240,7 +240,7 @@ impl ParameterSnapshot {
     }
 }
 
-/// Where the entry (i, j) of a symmetric matrix lies in its lower triangle packed by rows.
+/// Returns where the entry (i, j) of a symmetric matrix lies in its lower triangle packed by rows.
 pub const fn packed_index(i: usize, j: usize) -> usize {
     let (row, column) = if i >= j { (i, j) } else { (j, i) };
     row * (row + 1) / 2 + column

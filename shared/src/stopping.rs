@@ -75,7 +75,7 @@ pub enum RailAdhesion {
 }
 
 impl RailAdhesion {
-    /// The rail of a snapshot that gives `adhesion`; of a lower bound, and without a speed, none.
+    /// Returns the rail of a snapshot that gives `adhesion`; of a lower bound, and without a speed, none.
     ///
     /// The coefficient is that of the speed at which the braking was last seen, which is its lowest, and a
     /// rail carries less at higher speeds. So it is taken along the wet law, the steeper of the two: a
@@ -225,7 +225,7 @@ struct Shift {
 }
 
 impl Stop<'_> {
-    /// Distance and time, with a bound that holds with at least `confidence`.
+    /// Returns the distance and time, with a bound that holds with at least `confidence`.
     ///
     /// The bound moves every uncertain quantity to its unfavourable side. With one uncertain
     /// quantity it is the exact quantile, since distance and time are monotone in each; with k

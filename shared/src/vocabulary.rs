@@ -1,4 +1,4 @@
-//! The numbers on the wire and what they mean.
+//! The numbers on the wire and their meanings.
 //!
 //! A number, once given, keeps its meaning for a schema version. A peer that reads a number it
 //! does not know gets `None`, never a guess.
@@ -16,7 +16,7 @@ macro_rules! vocabulary {
             /// Every member, in the order of its number.
             pub const ALL: &'static [$name] = &[ $( $name::$item ),* ];
 
-            /// The member's name in files, command lines and machine-readable results.
+            /// Returns the member's name in files, command lines and machine-readable results.
             pub const fn name(self) -> &'static str {
                 match self { $( $name::$item => $text ),* }
             }
@@ -26,12 +26,12 @@ macro_rules! vocabulary {
                 match self { $( $name::$item => concat!($($doc),*) ),* }
             }
 
-            /// The member with this wire number.
+            /// Returns the member with this wire number.
             pub const fn from_number(number: $repr) -> Option<Self> {
                 match number { $( $number => Some($name::$item), )* _ => None }
             }
 
-            /// The member with this name.
+            /// Returns the member with this name.
             pub fn from_name(name: &str) -> Option<Self> {
                 Self::ALL.iter().copied().find(|member| member.name() == name)
             }
@@ -117,7 +117,7 @@ vocabulary! {
 }
 
 impl Quantity {
-    /// The quantity's bit in [`crate::ParameterSnapshot::quantities`].
+    /// Returns the quantity's bit in [`crate::ParameterSnapshot::quantities`].
     pub const fn bit(self) -> u32 {
         1 << self as u32
     }
@@ -284,7 +284,7 @@ vocabulary! {
 }
 
 impl Reason {
-    /// True when the samples themselves cannot be true, so that no estimate from them is.
+    /// Returns whether the samples themselves cannot be true, so that no estimate from them is.
     pub const fn is_implausible_input(self) -> bool {
         matches!(
             self,
@@ -298,7 +298,7 @@ impl Reason {
 }
 
 impl Manoeuvre {
-    /// The manoeuvre's bit in [`crate::ParameterSnapshot::missing_manoeuvres`].
+    /// Returns the manoeuvre's bit in [`crate::ParameterSnapshot::missing_manoeuvres`].
     pub const fn bit(self) -> u32 {
         1 << self as u32
     }

@@ -1,4 +1,4 @@
-//! `dynocar brakes` over simulated emergency stops, and what it writes.
+//! `dynocar brakes` over simulated emergency stops, and its output.
 
 use std::fmt::Write as _;
 use std::process::{Command, Output};

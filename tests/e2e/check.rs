@@ -1,4 +1,4 @@
-//! `dynocar check` as a user runs it: what it prints where, and its exit status.
+//! `dynocar check` as a user runs it: its output and its exit status.
 
 use std::path::Path;
 use std::process::{Command, Output};

@@ -1,4 +1,4 @@
-//! Wall clocks that jump by hours and days, under a daemon, a flight recorder and what they keep.
+//! Wall clocks that jump by hours and days, under a daemon, a flight recorder and their files.
 //!
 //! The jumps are those of the processes under test; the host's clock is left alone.
 

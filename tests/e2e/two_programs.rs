@@ -1,4 +1,4 @@
-//! One name for the user: `dynocar` becomes the workshop for what is not done beside a controller.
+//! One name for the user: `dynocar` becomes the workshop for work away from a controller.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -160,7 +160,7 @@ const WORDINGS: [(&str, &str); 12] = [
     ("from km {", "daemon/model/src/words.rs"),
     ("places between km", "daemon/model/src/words.rs"),
     ("true over declared mass", "daemon/model/src/words.rs"),
-    ("speeds read {", "daemon/model/src/words.rs"),
+    ("speeds read {} % too", "daemon/model/src/words.rs"),
     ("{unit} (95 % interval", "daemon/model/src/words.rs"),
     ("ends known to", "daemon/analysis/src/explain/report/effect.rs"),
     ("chance of as much", "daemon/analysis/src/explain/report/effect.rs"),

@@ -1,5 +1,5 @@
-//! Railways recorded once a second, with forces of an instant, held from stamp to stamp, or averaged:
-//! what the time offset of a survey says of them, and what is then explained.
+//! Railways recorded once a second, with forces of an instant, held from stamp to stamp, or averaged: the time offset
+//! that a survey finds, and the explanation that follows.
 
 use dynocar::dataset;
 use dynocar_analysis::dataset::Dataset;

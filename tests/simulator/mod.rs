@@ -1,4 +1,4 @@
-//! The simulator of trains, and what is learned from its recordings.
+//! The simulator of trains, and findings from its recordings.
 
 mod advice;
 mod brake_steps;

@@ -1,4 +1,4 @@
-//! A headless Chromium that opens pages and says what happened.
+//! A headless Chromium that opens pages and reports their state.
 //!
 //! It is spoken to by the DevTools protocol over two pipes (`--remote-debugging-pipe`): messages
 //! of JSON, each ended by a zero byte. No port is opened.
@@ -46,7 +46,7 @@ pub struct Browser {
     _profile: TempDir,
 }
 
-/// Path of the browser's program; installs it by `tests/install_browser.sh` where there is none.
+/// Returns the path of the browser's program; installs it by `tests/install_browser.sh` where there is none.
 ///
 /// # Panics
 ///
@@ -159,7 +159,7 @@ impl Browser {
         }
     }
 
-    /// The value of a script's expression in the page.
+    /// Returns the value of a script's expression in the page.
     ///
     /// # Panics
     ///

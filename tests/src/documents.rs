@@ -26,7 +26,7 @@ pub struct Shown {
     pub is_mention: bool,
 }
 
-/// All pages: those in the workspace's folder, in `docs` and the client's.
+/// Returns all pages: those in the workspace's folder, in `docs` and the client's.
 ///
 /// # Panics
 ///
@@ -52,7 +52,7 @@ pub fn pages() -> Vec<Page> {
 }
 
 impl Page {
-    /// The page's lines outside blocks of code, and those in them with the block's language.
+    /// Returns the page's lines outside blocks of code, and those in them with the block's language.
     fn lines(&self) -> impl Iterator<Item = (Option<&str>, &str)> {
         let mut language = None;
         self.text.lines().filter_map(move |line| {
@@ -75,7 +75,7 @@ impl Page {
         self.lines().filter(|(language, _)| language.is_none()).map(|(_, line)| line)
     }
 
-    /// Where the page's links lead, outside code.
+    /// Returns where the page's links lead, outside code.
     pub fn links(&self) -> Vec<&str> {
         let mut found = Vec::new();
         for line in self.prose() {
@@ -86,13 +86,13 @@ impl Page {
         found
     }
 
-    /// The anchors of the page's headings, as GitHub makes them.
+    /// Returns the anchors of the page's headings, as GitHub makes them.
     pub fn anchors(&self) -> Vec<String> {
         let headings = self.prose().filter(|line| line.starts_with('#'));
         headings.map(|line| anchor(line.trim_start_matches('#').trim())).collect()
     }
 
-    /// The paragraphs of running text: no tables, lists, headings or code.
+    /// Returns the paragraphs of running text: no tables, lists, headings or code.
     pub fn paragraphs(&self) -> Vec<String> {
         let mut found = vec![String::new()];
         for (language, line) in self.lines() {
@@ -115,7 +115,7 @@ impl Page {
         found
     }
 
-    /// The commands of a program, in blocks and in sentences.
+    /// Returns the commands of a program, in blocks and in sentences.
     pub fn commands(&self, program: &str) -> Vec<Shown> {
         let mut found = Vec::new();
         let mut begun = String::new();
@@ -146,13 +146,13 @@ impl Page {
     }
 }
 
-/// The anchor of a heading: lower case, punctuation left out, a hyphen for each space.
+/// Returns the anchor of a heading: lower case, punctuation left out, a hyphen for each space.
 fn anchor(heading: &str) -> String {
     let kept = heading.chars().filter(|it| it.is_alphanumeric() || matches!(it, ' ' | '-' | '_'));
     kept.flat_map(char::to_lowercase).map(|it| if it == ' ' { '-' } else { it }).collect()
 }
 
-/// A line as a command of a program, if it is one.
+/// Returns a line as a command of a program, if it is one.
 fn shown(place: String, line: &str, program: &str, is_mention: bool) -> Option<Shown> {
     let line = if is_mention {
         line.replace(" [", " ").replace("] ", " ").trim_end_matches(']').to_owned()
@@ -177,7 +177,7 @@ fn shown(place: String, line: &str, program: &str, is_mention: bool) -> Option<S
     (is_it && !words.is_empty()).then_some(Shown { place, words, is_mention })
 }
 
-/// The words of a line as a shell takes them, up to a comment, a pipe, a redirection or `&`.
+/// Returns the words of a line as a shell takes them, up to a comment, a pipe, a redirection or `&`.
 fn words(line: &str) -> Vec<String> {
     let (mut words, mut word, mut quote) = (Vec::new(), None::<String>, None);
     for char in line.chars() {
@@ -198,7 +198,7 @@ fn words(line: &str) -> Vec<String> {
 }
 
 impl Shown {
-    /// Why a command line does not take these words; what a mention leaves out is no reason.
+    /// Returns why a command line does not take these words; what a mention leaves out is no reason.
     pub fn refusal(&self, command: clap::Command) -> Option<String> {
         use ErrorKind::{
             DisplayHelp, DisplayHelpOnMissingArgumentOrSubcommand, DisplayVersion,

@@ -98,7 +98,7 @@ impl Target {
         Target::Sample,
     ];
 
-    /// The target's folder of the corpus.
+    /// Returns the target's folder of the corpus.
     pub fn folder(self) -> PathBuf {
         let name = format!("{self:?}").to_lowercase();
         Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(name)
@@ -147,7 +147,7 @@ impl Target {
         }
     }
 
-    /// The inputs that mutations start from.
+    /// Returns the inputs that mutations start from.
     ///
     /// # Panics
     ///

@@ -18,7 +18,7 @@ use dynocar_shared::{ParameterSnapshot, TrainId};
 /// Relative difference of final values that another C library may make.
 pub const TOLERANCE: f64 = 1e-6;
 
-/// The file's place.
+/// Returns the file's place.
 pub fn path() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("golden/demo.txt")
 }
@@ -145,7 +145,7 @@ pub fn compute() -> Golden {
 }
 
 impl Golden {
-    /// The file's text.
+    /// Returns the file's text.
     pub fn to_text(&self) -> String {
         let mut text = format!(
             "# The demo's recorded runs through every estimator: kind, used, rejected, lost, updates,\n\
@@ -193,7 +193,7 @@ impl Golden {
 /// so far that each observation is looked at eight times, which takes most of the time of all estimators together.
 const SLIDE: usize = 20;
 
-/// The default estimators, with windows of expectation maximisation that overlap by half.
+/// Returns the default estimators, with windows of expectation maximisation that overlap by half.
 pub fn frugal_estimators() -> Vec<EstimatorSettings> {
     let mut all = default_estimators();
     for settings in &mut all {

@@ -1,4 +1,4 @@
-//! How sensors and channels fail, applied to good samples.
+//! Failures of sensors and channels, applied to good samples.
 
 use dynocar_shared::{SampleField, TrainSample};
 use rand::{RngExt, SeedableRng};
@@ -56,7 +56,7 @@ impl SensorFailure {
         SensorFailure::TeleportingPosition,
     ];
 
-    /// True for a failure that lasts over several samples.
+    /// Returns true for a failure that lasts over several samples.
     const fn is_burst(self) -> bool {
         matches!(self, SensorFailure::Frozen | SensorFailure::Quantised)
     }

@@ -25,12 +25,12 @@ pub const FOLDERS: [&str; 19] = [
     "tests/src",
 ];
 
-/// The folder of the workspace.
+/// Returns the folder of the workspace.
 pub fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// All files of Rust in a folder of the workspace.
+/// Returns all files of Rust in a folder of the workspace.
 ///
 /// # Panics
 ///
@@ -50,13 +50,13 @@ pub fn rust_files(folder: &str) -> Vec<PathBuf> {
     files
 }
 
-/// True for a file that holds nothing but tests, or what tests need.
+/// Returns true for a file that holds nothing but tests, or what tests need.
 pub fn is_of_tests(path: &Path) -> bool {
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
     name.ends_with("tests") || name == "test_runs"
 }
 
-/// How many lines an item takes from its head on: to its semicolon, or to the brace that closes it at the same
+/// Returns how many lines an item takes from its head on: to its semicolon, or to the brace that closes it at the same
 /// indentation, as `cargo fmt` sets it.
 pub fn item_lines(lines: &[&str]) -> usize {
     let head = lines.first().copied().unwrap_or_default();
@@ -71,7 +71,7 @@ pub fn item_lines(lines: &[&str]) -> usize {
     closes.map_or(lines.len(), |more| last + more + 1)
 }
 
-/// A source without its tests.
+/// Returns a source without its tests.
 pub fn without_tests(text: &str) -> Vec<&str> {
     let lines: Vec<&str> = text.lines().collect();
     let (mut kept, mut at) = (Vec::new(), 0);

@@ -41,7 +41,7 @@ b = 0.05
 c = 0.004
 ";
 
-/// The tram as its owner declares it.
+/// Returns the tram as its owner declares it.
 pub fn declared() -> TrainModel {
     let davis = Davis { a: 4.0, b: 0.05, c: 0.004 };
     TrainModel {
@@ -51,7 +51,7 @@ pub fn declared() -> TrainModel {
     }
 }
 
-/// Gradient in ‰ at a chainage.
+/// Returns the gradient in ‰ at a chainage.
 fn gradient_permille(place_m: f64) -> f64 {
     [0.0, 30.0, -12.0, 60.0, -45.0, 8.0, -30.0][(place_m / 150.0) as usize % 7]
 }

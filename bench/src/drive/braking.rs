@@ -19,14 +19,14 @@ pub struct BrakingCurve {
 }
 
 impl BrakingCurve {
-    /// The curve of a train that brakes from a speed in m/s: the ordinary one, or a weaker one where
+    /// Returns the curve of a train that brakes from a speed in m/s: the ordinary one, or a weaker one where
     /// brake or rail are known to carry less.
     pub fn of(knowledge: &Knowledge, ability: &Ability, from_mps: f64) -> Self {
         let possible = PLANNED_SHARE * knowledge.braking_max_mps2(ability, from_mps);
         BrakingCurve::with(ability.braking_mps2.min(possible).max(0.05))
     }
 
-    /// This curve, or a weaker one.
+    /// Returns this curve, or a weaker one.
     #[must_use]
     pub fn no_steeper_than(self, other: BrakingCurve) -> Self {
         if other.full_mps2 < self.full_mps2 { other } else { self }
@@ -38,13 +38,13 @@ impl BrakingCurve {
         curve
     }
 
-    /// Deceleration in m/s² at a speed in m/s.
+    /// Returns the deceleration in m/s² at a speed in m/s.
     pub fn deceleration_mps2(&self, speed_mps: f64) -> f64 {
         let share = (speed_mps / SOFT_MPS).clamp(0.0, 1.0);
         self.full_mps2 * (END_SHARE + share * (1.0 - END_SHARE))
     }
 
-    /// Distance in m to standstill from a speed in m/s.
+    /// Returns the distance in m to standstill from a speed in m/s.
     pub fn distance_m(&self, speed_mps: f64) -> f64 {
         if speed_mps > SOFT_MPS {
             let sharp = speed_mps * speed_mps - SOFT_MPS * SOFT_MPS;
@@ -54,14 +54,14 @@ impl BrakingCurve {
         speed_mps / growth - end / (growth * growth) * (growth * speed_mps / end).ln_1p()
     }
 
-    /// Time in s to standstill from a speed in m/s.
+    /// Returns the time in s to standstill from a speed in m/s.
     pub fn time_s(&self, speed_mps: f64) -> f64 {
         let (end, growth) = self.soft();
         let soft_mps = speed_mps.min(SOFT_MPS);
         (growth * soft_mps / end).ln_1p() / growth + (speed_mps - soft_mps) / self.full_mps2
     }
 
-    /// The speed in m/s from which the train stands after a distance in m.
+    /// Returns the speed in m/s from which the train stands after a distance in m.
     pub fn speed_mps(&self, left_m: f64) -> f64 {
         let left_m = left_m.max(0.0);
         if left_m >= self.soft_m {
@@ -75,7 +75,7 @@ impl BrakingCurve {
         0.5 * (low + high)
     }
 
-    /// Deceleration in m/s² at standstill, and what it gains for each m/s.
+    /// Returns the deceleration in m/s² at standstill, and what it gains for each m/s.
     fn soft(&self) -> (f64, f64) {
         (self.full_mps2 * END_SHARE, self.full_mps2 * (1.0 - END_SHARE) / SOFT_MPS)
     }

@@ -58,7 +58,7 @@ impl Service {
         format!("{}, {}, {} ms", traffic_name(self.traffic), self.condition.name, self.cycle_ms)
     }
 
-    /// The first cells of a row of a table.
+    /// Returns the first cells of a row of a table.
     pub fn record(&self) -> Record {
         Record::default()
             .with("train", traffic_name(self.traffic))
@@ -66,12 +66,12 @@ impl Service {
             .with("cycle_ms", self.cycle_ms)
     }
 
-    /// The controller's cycle in s.
+    /// Returns the controller's cycle in s.
     pub fn cycle_s(&self) -> f64 {
         f64::from(self.cycle_ms) * 1e-3
     }
 
-    /// The world's scenario: places are those of balises, loads as the kind of traffic knows them.
+    /// Returns the world's scenario: places are those of balises, loads as the kind of traffic knows them.
     pub fn scenario(&self) -> Scenario {
         Scenario {
             traffic: self.traffic,
@@ -90,7 +90,7 @@ impl Service {
         }
     }
 
-    /// The train as declared, with drive and brake.
+    /// Returns the train as declared, with drive and brake.
     pub fn declared(&self) -> TrainModel {
         let mut train = self.traffic.declared();
         let ability = ability(self.traffic);
@@ -102,7 +102,7 @@ impl Service {
     }
 }
 
-/// The traffic in words.
+/// Returns the traffic in words.
 pub fn traffic_name(traffic: Traffic) -> &'static str {
     match traffic {
         Traffic::Metro => "metro",
@@ -234,14 +234,14 @@ impl Hidden {
         if self.tunnels_m.iter().any(is_inside) { 0.4 } else { 0.0 }
     }
 
-    /// The adhesion's law with the exact scale.
+    /// Returns the adhesion's law with the exact scale.
     pub fn adhesion(&self) -> RailAdhesion {
         let (law, scale) = self.rail;
         RailAdhesion::Law(law, Uncertain::exact(scale))
     }
 }
 
-/// Gross mass in kg of the next load.
+/// Returns the gross mass in kg of the next load.
 pub fn next_load_kg(traffic: Traffic, before_kg: f64, random: &mut Chance) -> f64 {
     match traffic {
         // From empty to full.

@@ -70,7 +70,7 @@ pub struct LegDriver {
 }
 
 impl LegDriver {
-    /// A driver whose train stands at the start of the leg.
+    /// Returns a driver whose train stands at the start of the leg.
     pub fn new(leg: PlannedLeg, ability: Ability, cycle_s: f64, knowledge: Knowledge) -> Self {
         let planner = Planner { leg: &leg, knowledge: &knowledge, ability: &ability };
         let plan = planner.plan((0.0, 0.0), leg.due_s);
@@ -97,17 +97,17 @@ impl LegDriver {
         self.phase
     }
 
-    /// Its estimates of distance in m and speed in m/s.
+    /// Returns its estimates of distance in m and speed in m/s.
     pub fn estimate(&self) -> (f64, f64) {
         (self.at_m, self.speed_mps)
     }
 
-    /// The leg.
+    /// Returns the leg.
     pub fn leg(&self) -> &PlannedLeg {
         &self.leg
     }
 
-    /// The force in N, braking negative, for what is measured and known.
+    /// Returns the force in N, braking negative, for what is measured and known.
     pub fn force_n(&mut self, measured: &DriverMeasurements, knowledge: &Knowledge) -> f64 {
         self.take_over(measured, knowledge);
         self.observe(measured);
@@ -175,7 +175,7 @@ impl LegDriver {
         self.plan = planner.plan(from, left_s);
     }
 
-    /// Place in m and speed in m/s when a force that is commanded now acts.
+    /// Returns the place in m and speed in m/s when a force that is commanded now acts.
     fn ahead(&self) -> (f64, f64) {
         let lag_s = self.ability.lag_s + 0.5 * self.cycle_s;
         let gained_mps = lag_s * self.acceleration_mps2;

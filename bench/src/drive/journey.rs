@@ -1,4 +1,4 @@
-//! A train and its driver from stop to stop, and what each leg was worth.
+//! A train and its driver from stop to stop, and the score of each leg.
 
 use dynocar_core::filter::FittedLine;
 use dynocar_model::simulate::STANDING_MPS;
@@ -72,7 +72,7 @@ pub struct Journey {
 }
 
 impl Journey {
-    /// A train about to leave its first stop.
+    /// Returns a train about to leave its first stop.
     pub fn new(train: Train) -> Self {
         Journey {
             standing_s: train.standing_s(),
@@ -105,12 +105,12 @@ impl Journey {
         }
     }
 
-    /// True where the driver brakes to the stopping point.
+    /// Returns whether the driver brakes to the stopping point.
     pub fn is_braking(&self) -> bool {
         self.driver.as_ref().is_some_and(|driver| driver.phase() == Phase::Braking)
     }
 
-    /// Time in s since the train left its stop.
+    /// Returns the time in s since the train left its stop.
     pub fn running_s(&self) -> f64 {
         self.running_s
     }

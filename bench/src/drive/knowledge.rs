@@ -42,24 +42,24 @@ pub struct Ability {
 }
 
 impl Knowledge {
-    /// Mass with its rotating part in kg.
+    /// Returns the mass with its rotating part in kg.
     pub fn inertial_kg(&self) -> f64 {
         self.mass_kg.value * (1.0 + self.rotating_mass_factor)
     }
 
-    /// Resistance and slope in N at a speed in m/s.
+    /// Returns the resistance and slope in N at a speed in m/s.
     pub fn resisting_n(&self, speed_mps: f64, slope_permille: f64) -> f64 {
         let weight_kn = 1e-3 * self.mass_kg.value * STANDARD_GRAVITY_MPS2;
         weight_kn * (self.davis.w0_n_per_kn(speed_mps) + slope_permille)
     }
 
-    /// Acceleration in m/s² under a force in N, braking negative.
+    /// Returns the acceleration in m/s² under a force in N, braking negative.
     pub fn acceleration_mps2(&self, force_n: f64, speed_mps: f64, slope_permille: f64) -> f64 {
         let exerted_n = if force_n < 0.0 { self.brake_scale.value * force_n } else { force_n };
         (exerted_n - self.resisting_n(speed_mps, slope_permille)) / self.inertial_kg()
     }
 
-    /// The force in N, braking negative, that gives an acceleration in m/s².
+    /// Returns the force in N, braking negative, that gives an acceleration in m/s².
     pub fn force_n(&self, acceleration_mps2: f64, speed_mps: f64, slope_permille: f64) -> f64 {
         let exerted_n =
             self.inertial_kg() * acceleration_mps2 + self.resisting_n(speed_mps, slope_permille);
@@ -69,7 +69,7 @@ impl Knowledge {
         }
     }
 
-    /// Deceleration in m/s² that brake and rail can give on the level at a speed in m/s.
+    /// Returns the deceleration in m/s² that brake and rail can give on the level at a speed in m/s.
     pub fn braking_max_mps2(&self, ability: &Ability, speed_mps: f64) -> f64 {
         let weight_n = self.mass_kg.value * STANDARD_GRAVITY_MPS2;
         let brake_n = ability.brake_max_n * self.brake_scale.value;
@@ -81,7 +81,7 @@ impl Knowledge {
         brake_n.min(carried_n) / self.inertial_kg()
     }
 
-    /// Distance in m of a full braking that is not exceeded with a confidence; `else_rail` is presumed
+    /// Returns the distance in m of a full braking that is not exceeded with a confidence; `else_rail` is presumed
     /// where nothing is known of the rail.
     ///
     /// # Errors

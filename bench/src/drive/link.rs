@@ -120,14 +120,14 @@ impl Link {
         answer.filter(Reading::is_usable).map(|reading| reading.snapshot)
     }
 
-    /// Samples that some pipeline lost.
+    /// Returns the samples that some pipeline lost.
     pub fn lost(&self) -> u64 {
         let readings = self.ends.iter().flat_map(|ends| ends.reader.readings(0));
         readings.map(|reading| reading.snapshot.samples_lost).sum()
     }
 }
 
-/// The train's file.
+/// Returns the train's file.
 fn train_toml(train: &TrainModel) -> Result<String, BenchError> {
     let effort = |curve: &EffortCurve| -> Vec<[f64; 2]> {
         curve.points().iter().map(|(speed_mps, force_n)| [*speed_mps, 1e-3 * force_n]).collect()

@@ -1,7 +1,7 @@
 //! Gain of a controller: an automatic driver with declared parameters, with the daemon's answers, and with the true
 //! ones.
 //!
-//! - [`knowledge`]: what a driver holds for true of its train, and what the train can do
+//! - [`knowledge`]: beliefs of a driver about its train, and the train's abilities
 //! - [`braking`]: the braking curve to the stopping point
 //! - [`plan`]: the line as the map has it, and the speed profile for the timetable with the least energy
 //! - [`driver`]: tracking the plan and the braking curve
@@ -10,7 +10,7 @@
 //! - [`journey`]: a train and its driver from stop to stop
 //! - [`link`]: channels to a daemon of its own, in lock-step
 //! - [`run`]: all trains of a service with one kind of parameters
-//! - [`score`], [`picture`]: what it comes to
+//! - [`score`], [`picture`]: the result
 
 pub mod braking;
 pub mod deviations;
@@ -66,7 +66,7 @@ pub struct DriveArguments {
     picture: Option<PathBuf>,
 }
 
-/// Every scenario.
+/// Returns every scenario.
 fn services(cycle_ms: Option<u32>) -> Vec<Service> {
     let all = [Traffic::Metro, Traffic::Emu, Traffic::HighSpeed, Traffic::Freight];
     let of = |traffic: Traffic| {
@@ -121,7 +121,7 @@ impl DriveArguments {
     }
 }
 
-/// The ordinary service of each traffic; that of its usual cycle comes first.
+/// Returns the ordinary service of each traffic; that of its usual cycle comes first.
 fn ordinary(scored: &[Scored]) -> Vec<&Scored> {
     let mut first: Vec<&Scored> = Vec::new();
     for it in scored.iter().filter(|it| it.service.condition == ORDINARY) {

@@ -19,7 +19,7 @@ const PANELS: [(&str, usize, f64, f64); 3] = [
     ("energy above the least in %", ENERGY, 1.0, -100.0),
 ];
 
-/// The picture of some services as SVG; one group of bars each.
+/// Returns the picture of some services as SVG; one group of bars each.
 ///
 /// # Errors
 ///

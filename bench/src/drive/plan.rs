@@ -23,7 +23,7 @@ pub struct PlannedLeg {
 }
 
 impl PlannedLeg {
-    /// Gradient and curve resistance in ‰ at a distance in m.
+    /// Returns the gradient and curve resistance in ‰ at a distance in m.
     pub fn slope_permille(&self, at_m: f64) -> f64 {
         let Some(last) = self.slopes_permille.len().checked_sub(1) else { return 0.0 };
         let place = (at_m / PIECE_M).clamp(0.0, last as f64);
@@ -32,7 +32,7 @@ impl PlannedLeg {
         from + share * (to - from)
     }
 
-    /// The mean over a section in ‰.
+    /// Returns the mean over a section in ‰.
     pub fn mean_slope_permille(&self, from_m: f64, to_m: f64) -> f64 {
         let count = 16;
         let at = |k: i32| from_m + (to_m - from_m) * (f64::from(k) + 0.5) / f64::from(count);
@@ -78,7 +78,7 @@ pub struct Planner<'a> {
 }
 
 impl Planner<'_> {
-    /// The plan with the least energy, from a distance in m and a speed in m/s, that needs no more than
+    /// Returns the plan with the least energy, from a distance in m and a speed in m/s, that needs no more than
     /// `left_s`; the fastest one where none does.
     pub fn plan(&self, from: (f64, f64), left_s: f64) -> DrivePlan {
         let top = self.leg.top_mps;
@@ -106,7 +106,7 @@ impl Planner<'_> {
         best
     }
 
-    /// The latest possible coasting that is still in time at a cruising speed in m/s.
+    /// Returns the latest possible coasting that is still in time at a cruising speed in m/s.
     fn in_time(&self, from: (f64, f64), cruise_mps: f64, left_s: f64) -> Option<DrivePlan> {
         let mut best = self.run(from, cruise_mps, self.leg.length_m);
         if best.time_s > left_s {
@@ -141,7 +141,7 @@ impl Planner<'_> {
         Some(best)
     }
 
-    /// The run at a cruising speed with coasting from a distance on.
+    /// Returns the run at a cruising speed with coasting from a distance on.
     pub fn run(
         &self,
         (mut at_m, mut speed_mps): (f64, f64),
@@ -177,7 +177,7 @@ impl Planner<'_> {
         DrivePlan { cruise_mps, coast_from_m, time_s, energy_j }
     }
 
-    /// Force in N over a piece of the leg, and the speed in m/s at its end.
+    /// Returns the force in N over a piece of the leg, and the speed in m/s at its end.
     fn step(
         &self,
         (at_m, speed_mps): (f64, f64),

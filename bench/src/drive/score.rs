@@ -143,7 +143,7 @@ pub fn score(service: Service, all: &[Vec<DrivenRecord>; 3]) -> Scored {
     Scored { service, lines, answers, differences, broken }
 }
 
-/// A figure under three names: value, lower and upper end of its interval.
+/// Returns a figure under three names: value, lower and upper end of its interval.
 fn ranged(
     record: Record,
     name: &str,

@@ -1,4 +1,5 @@
-//! The simulated train: how it moves under a force, and what its sensors measure. No estimator sees its true parameters.
+//! The simulated train: its motion under a force, and the readings of its sensors. No estimator sees its true
+//! parameters.
 
 use std::collections::VecDeque;
 
@@ -54,7 +55,7 @@ pub struct Train {
 }
 
 impl Train {
-    /// A train at the first stop.
+    /// Returns a train at the first stop.
     pub fn new(service: Service, seed: u64) -> Self {
         let world = World::draw(service.scenario(), Mistakes::USUAL, seed);
         let mut random = Chance::new(seed ^ 0x6472_6976_6572);
@@ -119,7 +120,7 @@ impl Train {
         self.load();
     }
 
-    /// The leg ahead by the map, without a time.
+    /// Returns the leg ahead by the map, without a time.
     pub fn leg(&self) -> PlannedLeg {
         let length_m = self.direction * (self.world.stops_m[self.next_stop] - self.start_m);
         let pieces = (length_m / PIECE_M) as usize + 2;
@@ -153,7 +154,7 @@ impl Train {
         self.brake_scale / self.world.force_scale[1]
     }
 
-    /// The true rail's adhesion at a speed in m/s.
+    /// Returns the true rail's adhesion at a speed in m/s.
     pub fn adhesion(&self, speed_mps: f64) -> f64 {
         let (law, scale) = self.hidden.rail;
         law.adhesion(speed_mps) * scale
@@ -166,7 +167,7 @@ impl Train {
         Davis { a: a + c * head_mps * head_mps, b: b + 2.0 * c * head_mps, c }
     }
 
-    /// The true parameters, counted in reported forces.
+    /// Returns the true parameters, counted in reported forces.
     pub fn truth(&self) -> Knowledge {
         let [traction, brake] = self.world.force_scale;
         // m dv/dt = reported / scale - W w is scale m dv/dt = reported - scale W w.
@@ -180,7 +181,7 @@ impl Train {
         }
     }
 
-    /// Acceleration in m/s² under a reported force in N at a distance and speed.
+    /// Returns the acceleration in m/s² under a reported force in N at a distance and speed.
     fn acceleration_mps2(&self, reported_n: f64, at: SimulatedMotion) -> f64 {
         let weight_n = self.mass_kg * STANDARD_GRAVITY_MPS2;
         let force_n = match reported_n < 0.0 {
@@ -267,7 +268,7 @@ impl Train {
         sample
     }
 
-    /// Distance in m from the start of the way of a measured place.
+    /// Returns the distance in m from the start of the way of a measured place.
     pub fn along_m(&self, sample: &TrainSample) -> f64 {
         self.direction * (sample.position_m - self.start_m)
     }

@@ -1,4 +1,4 @@
-//! Another build of this program compared with this one: what a change of an estimator costs.
+//! Another build of this program compared with this one: the cost of a change of an estimator.
 //!
 //! Both programs measure the same cases by turns, each in a process of its own. Ratios and
 //! differences are taken round by round.

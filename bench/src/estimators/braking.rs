@@ -4,7 +4,7 @@
 use std::rc::Rc;
 
 use dynocar_core::pipeline::braking::engine::{BrakingObservation, Engine};
-use dynocar_core::pipeline::braking::law_bank::BrakingLaw;
+use dynocar_core::pipeline::braking::law::BrakingLaw;
 use dynocar_core::pipeline::braking::motion::{MotionNoise, StepInputs, Walk};
 use dynocar_core::pipeline::braking::settings::BrakingSettings;
 use dynocar_core::pipeline::braking::tracker::{PriorScale, Tracker, TrackerModel};
@@ -42,7 +42,7 @@ const INPUTS: StepInputs = StepInputs {
     basic_mps2: [0.0077, 2.3e-4, 1.46e-5],
 };
 
-/// The first observations of a braking on a wet rail.
+/// Returns the first observations of a braking on a wet rail.
 fn braking(samples: usize, seed: u64) -> Vec<BrakingObservation> {
     let observation = |it: &BrakingMoment| BrakingObservation {
         distance_m: it.measured_m,
@@ -82,7 +82,7 @@ fn tracker(walk: Walk, lag: usize) -> Tracker {
     Tracker::new(model, lag as f64 * INPUTS.step_s, lag, false)
 }
 
-/// The cases of this module.
+/// Returns the cases of this module.
 pub fn cases() -> Vec<EstimatorCase> {
     let windows: Rc<[_]> = (1..=WINDOWS).map(|seed| braking(SAMPLES, seed)).collect();
     let long: Rc<[_]> = [braking(STEPS + 1, 99)].into();

@@ -19,7 +19,7 @@ const LENGTH: usize = 6;
 const PENALTY: f64 = 4e-4;
 const FORGETTING: f64 = 0.9998;
 
-/// Resistance over speeds of 5 to 35 m/s in units of 20 m/s, as coasting shows it.
+/// Returns the resistance over speeds of 5 to 35 m/s in units of 20 m/s, as coasting shows it.
 fn rows() -> Rc<[Row]> {
     let mut random = Chance::new(7);
     (0..ROWS)
@@ -31,7 +31,7 @@ fn rows() -> Rc<[Row]> {
         .collect()
 }
 
-/// The cases of this module.
+/// Returns the cases of this module.
 pub fn cases() -> Vec<EstimatorCase> {
     let rows = rows();
     let of = |name, run: fn(&[Row]) -> Vector3<f64>| {

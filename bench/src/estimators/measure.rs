@@ -44,7 +44,7 @@ pub fn quartiles(values: Vec<f64>) -> [f64; 3] {
 }
 
 impl EstimatorCase {
-    /// A case by its name, the updates in a pass, and a pass, which gives what was estimated.
+    /// Returns a case by its name, the updates in a pass, and a pass, which gives what was estimated.
     pub fn new<T>(
         name: impl Into<String>,
         updates: usize,

@@ -1,7 +1,7 @@
 //! Time of an update of every estimator and every pipeline.
 //!
 //! - [`measure`]: rounds, medians, the table
-//! - [`least_squares`], [`trajectory`], [`braking`]: what estimators are made of
+//! - [`least_squares`], [`trajectory`], [`braking`]: parts of estimators
 //! - [`pipelines`]: every kind of pipeline from sample to snapshot, and the filter of the mass
 //! - [`against`]: another build of the program beside this one
 
@@ -57,7 +57,7 @@ impl EstimatorsArguments {
     }
 }
 
-/// Every case, in the order of the table.
+/// Returns every case, in the order of the table.
 ///
 /// # Errors
 ///

@@ -36,7 +36,7 @@ struct DemoRun {
 }
 
 impl DemoRun {
-    /// The first run of the dataset.
+    /// Returns the first run of the dataset.
     ///
     /// # Errors
     ///
@@ -58,7 +58,7 @@ impl DemoRun {
         *pipeline.snapshot()
     }
 
-    /// The motion at every sample that has one.
+    /// Returns the motion at every sample that has one.
     fn motions(&self) -> Vec<KnownMotion> {
         let mut resolve = resolving(DATASET_TRAIN, &self.train, self.track.clone());
         let motion = |sample| KnownMotion::of(&resolve(sample)?).ok();
@@ -66,13 +66,13 @@ impl DemoRun {
     }
 }
 
-/// Every kind that can be built.
+/// Returns every kind that can be built.
 fn kinds() -> impl Iterator<Item = PipelineKind> {
     let can_be_built = |kind: &PipelineKind| EstimatorSettings::default_of(*kind).is_some();
     PipelineKind::ALL.iter().copied().filter(can_be_built)
 }
 
-/// The filter of the mass, and one case for each kind of pipeline.
+/// Returns the filter of the mass, and one case for each kind of pipeline.
 ///
 /// # Errors
 ///

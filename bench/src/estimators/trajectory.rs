@@ -30,7 +30,7 @@ const NO_OUTLIERS: OutlierModel = OutlierModel { share: 0.0, density: 0.5 };
 /// Steps, and speeds in m/s before, between and after them.
 type Run = (Vec<TrajectoryStep>, Vec<f64>);
 
-/// A run of steps of a size, whose drive in m/s² and resistance follow from the number of a step.
+/// Returns a run of steps of a size, whose drive in m/s² and resistance follow from the number of a step.
 fn run(
     rule: StepRule,
     count: usize,
@@ -52,7 +52,7 @@ fn run(
     (steps, speeds_mps)
 }
 
-/// The cases of this module.
+/// Returns the cases of this module.
 pub fn cases() -> Vec<EstimatorCase> {
     let mut random = Chance::new(3);
     // Traction and coasting by turns; the resistance grows by half midway.
@@ -76,7 +76,7 @@ pub fn cases() -> Vec<EstimatorCase> {
     ]
 }
 
-/// The noise that `trajectory_kalman` starts from.
+/// Returns the noise that `trajectory_kalman` starts from.
 fn noise(learns: bool) -> NoiseModel {
     let gain = mps2_per_n_per_kn(ROTATING_MASS_FACTOR);
     NoiseModel {

@@ -21,7 +21,7 @@ struct TrueLaw {
     parameters: Vec<Parameter>,
 }
 
-/// The numbers of a law besides its size; a number that only scales another does not count.
+/// Returns the numbers of a law besides its size; a number that only scales another does not count.
 fn numbers_of(law: &mut Law) -> Vec<&mut f64> {
     match law {
         Law::Band { centre_mps, width_mps } => vec![centre_mps, width_mps],
@@ -38,7 +38,7 @@ fn numbers(mut law: Law) -> Vec<f64> {
     numbers_of(&mut law).into_iter().map(|number| *number).collect()
 }
 
-/// The law with other numbers.
+/// Returns the law with other numbers.
 fn with_numbers(mut law: Law, numbers: &[f64]) -> Law {
     numbers_of(&mut law).into_iter().zip(numbers).for_each(|(own, number)| *own = *number);
     law
@@ -79,7 +79,7 @@ impl Hypothesis for TrueLaw {
     }
 }
 
-/// Error in m/s on the holdout runs that the true law leaves when its numbers and a, b, c are
+/// Returns the error in m/s on the holdout runs that the true law leaves when its numbers and a, b, c are
 /// fitted to the fit runs, from the truth on and by the very fit that `explain` uses; `None` where
 /// no law of the simulator's own acts.
 pub fn attainable_mps(simulated: &SimulatedDataset, explanation: &Explanation) -> Option<f64> {

@@ -1,4 +1,4 @@
-//! Which simulated datasets explain and monitor work on.
+//! The simulated datasets of `explain` and `monitor`.
 
 use std::io;
 use std::path::Path;
@@ -84,7 +84,7 @@ pub struct FamilyArguments {
 }
 
 impl FamilyArguments {
-    /// The scenarios asked for, else the usual ones.
+    /// Returns the scenarios asked for, else the usual ones.
     ///
     /// # Errors
     ///
@@ -98,7 +98,7 @@ impl FamilyArguments {
         if self.kinds.is_empty() { Ok(usual) } else { chosen.collect() }
     }
 
-    /// Every scenario with every seed, scenario by scenario.
+    /// Returns every scenario with every seed, scenario by scenario.
     pub fn cases(&self, scenarios: &[ExplainScenario]) -> Vec<SimulatedCase> {
         let (first, world, runs) = (self.first_seed, self.world, self.runs);
         let seeds = move || first..first + self.seeds as u64;

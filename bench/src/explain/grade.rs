@@ -97,7 +97,7 @@ pub fn grade(
     }
 }
 
-/// Whether the answer names what acts, and nothing else.
+/// Returns whether the answer names what acts, and nothing else.
 fn is_exactly(
     simulated: &SimulatedDataset,
     competing: Option<(EffectKind, bool)>,

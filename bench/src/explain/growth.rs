@@ -1,4 +1,4 @@
-//! How the time of an explanation grows with the data: more runs, and longer ones.
+//! Growth of the time of an explanation with the number and length of its runs.
 
 use std::time::Instant;
 

@@ -1,9 +1,9 @@
 //! `dynocar explain` over seeded simulations of every kind of effect and of nulls.
 //!
-//! - [`scenario`]: what is simulated, and what is a little wrong besides
+//! - [`scenario`]: the simulated effects and the usual errors
 //! - [`family`]: which datasets of it
 //! - [`grade`]: the answer against the truth
-//! - [`attainable`]: what the true law leaves when its numbers are estimated
+//! - [`attainable`]: the error of the true law with estimated numbers
 //! - [`parameters`]: its numbers and places against the true ones
 //! - [`matrix`]: all kinds over all seeds, in numbers
 //! - [`growth`]: time for 1, 4 and 16 times the data

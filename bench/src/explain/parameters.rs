@@ -22,13 +22,14 @@ pub struct ParameterGrade {
 }
 
 impl ParameterGrade {
-    /// True when the 95 % interval holds the truth.
+    /// Returns whether the 95 % interval holds the truth.
     pub fn is_held(&self) -> bool {
         self.z.abs() < HALF_95
     }
 }
 
-/// Every number of an effect that the answer, or its part about the runs of a role, has by the same name; the size of an effect is its distance from none.
+/// Returns every number of an effect that the answer, or its part about the runs of a role, has by the same name; the
+/// size of an effect is its distance from none.
 pub fn graded(
     effect: &TrueEffect,
     own: &Value,
@@ -66,7 +67,7 @@ pub fn graded(
     together.into_iter().chain(singly).chain(mass_factors(&truths, own, simulated)).collect()
 }
 
-/// The error of the gradient at every node that was found, over the root mean square of the effect. All that
+/// Returns the error of the gradient at every node that was found, over the root mean square of the effect. All that
 /// the map lacks is true there: the effect, and what usual surveys leave.
 fn gradient_errors(
     profile: &[(f64, f64)],
@@ -100,8 +101,8 @@ fn disturbances(simulated: &SimulatedDataset, plan: &RunPlan) -> Disturbances {
     Disturbances::of(effects, train, line, plan, settings)
 }
 
-/// Mean wind in m/s towards direction -1 that blew in the runs whose winds the answer gives, else in all of a role: the
-/// effect's and each day's own.
+/// Returns the mean wind in m/s towards direction -1 that blew in the runs whose winds the answer gives, else in all of
+/// a role: the effect's and each day's own.
 fn wind_of_the_days(own: &Value, simulated: &SimulatedDataset, role: Role) -> f64 {
     let given = own["parameters"]["headwind_mps"].as_object();
     let is_given = |file: &str| given.is_none_or(|given| given.contains_key(file));
@@ -122,7 +123,7 @@ fn load_of_the_day(simulated: &SimulatedDataset, file: &str) -> f64 {
 const MASS_LISTS: [[&str; 4]; 2] =
     [["sections", "from_m", "to_m", "direction"], ["windows", "t_start_s", "t_end_s", "run"]];
 
-/// Every true factor against the factor found where it holds longest, if that is in most of its place: next to
+/// Returns every true factor against the factor found where it holds longest, if that is in most of its place: next to
 /// a place without a factor of its own lies another one's.
 fn mass_factors(truths: &Value, own: &Value, simulated: &SimulatedDataset) -> Vec<ParameterGrade> {
     let of = |it: &Value, key: &str| it[key].as_f64().unwrap_or(0.0);
@@ -156,7 +157,7 @@ fn pairs(value: &Value) -> Vec<[f64; 2]> {
     list.filter_map(|pair| Some([pair[0].as_f64()?, pair[1].as_f64()?])).collect()
 }
 
-/// The windows of a place on one axis for all runs, each far from the next.
+/// Returns the windows of a place on one axis for all runs, each far from the next.
 fn windows(place: &Value, simulated: &SimulatedDataset) -> Vec<[f64; 2]> {
     let window = |it: &Value| {
         let is_own = |run: &SimulatedRun| !run.plan.is_holdout && it["run"] == run.plan.file();
@@ -188,7 +189,7 @@ fn iou(truth: &[[f64; 2]], found: &[[f64; 2]]) -> f64 {
     both / (length(truth) + length(found) - both)
 }
 
-/// Whether the 95 % intervals of the ends of a place hold the true ends. An end of an interval is
+/// Returns whether the 95 % intervals of the ends of a place hold the true ends. An end of an interval is
 /// compared with that of the true one which it overlaps most.
 pub fn ends_within(effect: &TrueEffect, own: &Value) -> Vec<bool> {
     let known = &own["where"]["uncertainty_95"];

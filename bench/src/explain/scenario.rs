@@ -30,7 +30,7 @@ impl ExplainWorld {
         }
     }
 
-    /// Kinds that are in this world, small, whatever else acts: to name them is no error.
+    /// Returns the kinds that are in this world, small, whatever else acts: to name them is no error.
     pub fn everyday(self) -> &'static [EffectKind] {
         // The last is a deviation of the rougher world alone.
         const KINDS: [EffectKind; 9] = [
@@ -124,13 +124,13 @@ const LOAD_SCATTER: f64 = 0.012;
 const HEAVY: Defects = Defects { outliers: 0.02, ..Defects::ALL };
 
 impl ExplainScenario {
-    /// All of them, in the order of the table.
+    /// Returns all of them, in the order of the table.
     pub fn all() -> Vec<ExplainScenario> {
         let kinds = EffectKind::ALL.iter().copied().map(ExplainScenario::Kind);
         kinds.chain(FAMILIES.map(|(family, _)| family)).collect()
     }
 
-    /// Its name on the command line and in the table.
+    /// Returns its name on the command line and in the table.
     pub fn name(self) -> &'static str {
         match self {
             ExplainScenario::Kind(kind) => kind.name(),
@@ -138,12 +138,12 @@ impl ExplainScenario {
         }
     }
 
-    /// True when nothing undeclared acts.
+    /// Returns whether nothing undeclared acts.
     pub fn is_null(self) -> bool {
         matches!(self, ExplainScenario::Kind(EffectKind::None) | ExplainScenario::PoorNull)
     }
 
-    /// The undeclared kinds of the dataset with this seed.
+    /// Returns the undeclared kinds of the dataset with this seed.
     pub fn kinds(self, seed: u64) -> Vec<EffectKind> {
         let drawn = |count: usize| (seed % count as u64) as usize;
         match self {
@@ -191,8 +191,8 @@ impl ExplainScenario {
         }
     }
 
-    /// The kind that is hardly distinguishable from the one that acts, and whether no data of the family distinguish
-    /// the two.
+    /// Returns the kind that is hardly distinguishable from the one that acts, and whether no data of the family
+    /// distinguish the two.
     pub fn competing(self) -> Option<(EffectKind, bool)> {
         match self {
             ExplainScenario::Alike => Some((EffectKind::MassChange, true)),

@@ -26,12 +26,12 @@ impl LatencyCase {
         LatencyCase::new(format!("dynocar/{kind}"), idle, Answerer::Daemon(vec![kind], Some(kind)))
     }
 
-    /// The compared pipeline, and behind it on its thread every other fast one.
+    /// Returns the compared pipeline, and behind it on its thread every other fast one.
     pub fn all_fast(idle: IdleStrategy) -> Self {
         LatencyCase::new("dynocar/all_fast", idle, all_fast(true))
     }
 
-    /// The compared pipeline with other readers of its channels, or with candidates on trial in its shadow.
+    /// Returns the compared pipeline with other readers of its channels, or with candidates on trial in its shadow.
     fn beside(
         what: &str,
         (companions, candidates): (&'static [Companion], u32),
@@ -42,12 +42,12 @@ impl LatencyCase {
         LatencyCase { name, setting: Setting { companions, candidates, ..setting } }
     }
 
-    /// Its name with what it does while no sample comes.
+    /// Returns its name with what it does while no sample comes.
     pub fn label(&self) -> String {
         format!("{} ({})", self.name, self.setting.idle)
     }
 
-    /// The strategy of the floor that this case is compared with: nothing is lower for an
+    /// Returns the strategy of the floor that this case is compared with: nothing is lower for an
     /// adaptive thread than one that never sleeps.
     pub fn floor_idle(&self) -> IdleStrategy {
         match self.setting.idle {
@@ -57,7 +57,7 @@ impl LatencyCase {
     }
 }
 
-/// The daemon with every fast pipeline, of which the compared one is the first or the last.
+/// Returns the daemon with every fast pipeline, of which the compared one is the first or the last.
 fn all_fast(is_first: bool) -> Answerer {
     let mut pipelines = pipelines::fast();
     pipelines.retain(|&kind| kind != COMPARED);
@@ -65,7 +65,7 @@ fn all_fast(is_first: bool) -> Answerer {
     Answerer::Daemon(pipelines, Some(COMPARED))
 }
 
-/// Every case, or the ones that a quick check runs.
+/// Returns every case, or the ones that a quick check runs.
 pub fn cases(is_quick: bool) -> Vec<LatencyCase> {
     use IdleStrategy::{Adaptive, Busy, Event};
     let mut cases = vec![
@@ -89,7 +89,7 @@ pub fn cases(is_quick: bool) -> Vec<LatencyCase> {
     cases
 }
 
-/// The cases with other readers, for whoever has built their programs.
+/// Returns the cases with other readers, for whoever has built their programs.
 pub fn cases_with_readers() -> Vec<LatencyCase> {
     use Companion::{Live, Recorder};
     let all: [(&str, &[Companion]); 3] =
@@ -98,7 +98,7 @@ pub fn cases_with_readers() -> Vec<LatencyCase> {
     [of(IdleStrategy::Event), of(IdleStrategy::Busy)].concat()
 }
 
-/// The cases with models on trial.
+/// Returns the cases with models on trial.
 pub fn cases_in_shadow() -> Vec<LatencyCase> {
     [IdleStrategy::Event, IdleStrategy::Busy]
         .map(|idle| LatencyCase::beside("two_candidates", (&[], 2), idle))

@@ -116,7 +116,7 @@ pub fn measure(batches: usize) -> Result<Costs, BenchError> {
     })
 }
 
-/// The time of one call, in ns, from a batch.
+/// Returns the time of one call, in ns, from a batch.
 fn of_batch(mut call: impl FnMut()) -> f64 {
     let before_ns = monotonic_now_ns();
     for _ in 0..CALLS {

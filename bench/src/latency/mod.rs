@@ -5,7 +5,7 @@
 //! else the machine does falls on all of them alike. Ratios to the floor are taken within a round;
 //! the median of the rounds is reported.
 //!
-//! - [`case`]: what is measured together with what, and beside which readers of the same channels
+//! - [`case`]: cases that are measured together, and the other readers of their channels
 //! - [`costs`]: one poll and one publish
 //! - [`report`]: the result, in numbers and as a picture
 

@@ -34,7 +34,7 @@ pub struct MeasuredCase {
     pub extent: Extent,
 }
 
-/// All latencies of a case.
+/// Returns all latencies of a case.
 pub fn pooled(
     trials: &[OpenLoopTrial],
     of: fn(&TrialOutcome) -> &Histogram<u64>,
@@ -88,8 +88,8 @@ pub fn of(measured: &MeasuredCase) -> (Value, String) {
     (all, lines.join("\n") + "\n")
 }
 
-/// A case: its quantiles, medians over the rounds of its ratio to the floor, and how often the daemon's thread was made
-/// to wait.
+/// Returns a case: its quantiles, medians over the rounds of its ratio to the floor, and how often the daemon's thread
+/// was made to wait.
 fn record((case, trials): &Rounds, all: &[Rounds]) -> Record {
     let floor =
         all.iter().find(|(it, _)| it.name == "floor" && it.setting.idle == case.floor_idle());
@@ -168,7 +168,7 @@ fn draw_into(measured: &MeasuredCase, svg: &mut String) -> Result<(), BenchError
     Ok(())
 }
 
-/// The other pipelines alone lie so near to each other that lines would hide lines.
+/// Returns the other pipelines alone lie so near to each other that lines would hide lines.
 fn is_shown(case: &LatencyCase) -> bool {
     match &case.setting.answerer {
         Answerer::Daemon(_, polled) => *polled == Some(COMPARED),

@@ -85,7 +85,7 @@ pub fn watch(data: &SimulatedDataset) -> Watched {
     watched
 }
 
-/// Time driven in s since the sample before.
+/// Returns the time driven in s since the sample before.
 fn driven_s(last_ns: &mut Option<i64>, sample: &TrainSample) -> f64 {
     let before_ns = last_ns.replace(sample.time_ns);
     let step_s = before_ns.map_or(0.0, |before_ns| (sample.time_ns - before_ns) as f64 * 1e-9);
@@ -100,7 +100,7 @@ fn acts_at(data: &SimulatedDataset, run: &SimulatedRun, sample: &TrainSample) ->
 }
 
 impl Watched {
-    /// The kinds that led a suspicion and do not act.
+    /// Returns the kinds that led a suspicion and do not act.
     pub fn false_suspicions(&self) -> impl Iterator<Item = EffectKind> {
         self.raised.iter().map(|(kind, _)| *kind).filter(|kind| !self.truth.contains(kind))
     }
@@ -124,7 +124,7 @@ impl Watched {
     }
 }
 
-/// Whether any effect of a dataset acts in a state of one of its runs.
+/// Returns whether any effect of a dataset acts in a state of one of its runs.
 fn acts(data: &SimulatedDataset, run: &SimulatedRun, state: &TrueState) -> bool {
     let one = |effect: &TrueEffect| one_acts(effect, data, run, state);
     state.speed_mps > MOVING_MPS && data.effects.iter().any(one)

@@ -1,5 +1,5 @@
-//! The residual monitor over seeded simulations: how soon it names what begins to act, how long it
-//! names what does not, and how seldom it names something while nothing does.
+//! The residual monitor over seeded simulations: the delay until it names an effect that begins to act, the time for
+//! which it names one that does not act, and its false alarms.
 //!
 //! - [`watch`]: one simulated dataset, fed sample by sample
 

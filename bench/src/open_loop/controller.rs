@@ -1,4 +1,4 @@
-//! A train's controller in the open loop: sends what is due, and counts the answers.
+//! A train's controller in the open loop: sends the samples that are due, and counts the answers.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -46,7 +46,7 @@ impl TrialOutcome {
         TrialOutcome { offered: 0, used: 0, rejected: 0, from_appointed, from_publish }
     }
 
-    /// Samples of which the pipeline gave no account: lost, and too late to be noticed as lost.
+    /// Returns the samples of which the pipeline gave no account: lost, and too late to be noticed as lost.
     pub fn missing(&self) -> u64 {
         self.offered.saturating_sub(self.used + self.rejected)
     }
@@ -73,7 +73,7 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// A controller that has sent nothing, and receives from `pipelines` pipelines.
+    /// Returns a controller that has sent nothing, and receives from `pipelines` pipelines.
     pub fn new(wire: Box<dyn BenchTransport>, traffic: LoopTraffic, pipelines: usize) -> Self {
         let in_flight = vec![(0, 0); IN_FLIGHT].into();
         let answers = vec![[Answer::default(); 2]; pipelines];

@@ -3,8 +3,8 @@
 //!
 //! - [`traffic`]: a train's samples, when they leave, and which are bad
 //! - [`wire`]: the controller's end of each transport
-//! - [`controller`]: sends what is due, and counts the answers
-//! - [`trial`]: who answers, how many trains there are, and what came of it
+//! - [`controller`]: sends the samples that are due, and counts the answers
+//! - [`trial`]: the answering side, the number of trains, and the outcome
 //! - [`server`]: the answering processes
 //! - [`sockets`]: the alternatives to shared memory
 //! - `zeromq`: ZeroMQ, with the feature of that name

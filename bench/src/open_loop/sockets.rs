@@ -40,7 +40,7 @@ pub trait Socket {
     /// When the socket fails for good.
     fn send(&mut self, bytes: &[u8]) -> Result<(), BenchError>;
 
-    /// The length of a message that has come.
+    /// Returns the length of a message that has come.
     ///
     /// # Errors
     ///
@@ -79,7 +79,7 @@ pub fn serve(folder: &Path, mut socket: impl Socket) -> Result<(), BenchError> {
     }
 }
 
-/// The payload of a message that has come, if it is as long as one.
+/// Returns the payload of a message that has come, if it is as long as one.
 fn take<T: Payload>(socket: &mut impl Socket) -> Result<Option<T>, BenchError> {
     // No payload is longer.
     let mut bytes = [0; size_of::<ParameterSnapshot>()];
@@ -87,14 +87,14 @@ fn take<T: Payload>(socket: &mut impl Socket) -> Result<Option<T>, BenchError> {
     Ok(count.and_then(|count| from_bytes(&bytes[..count])))
 }
 
-/// The bytes of a payload.
+/// Returns the bytes of a payload.
 fn as_bytes<T: Payload>(payload: &T) -> &[u8] {
     // SAFETY: a payload is a `repr(C)` struct of plain numbers without padding (checked when it
     // is compiled), so that every one of its bytes is initialised.
     unsafe { std::slice::from_raw_parts(std::ptr::from_ref(payload).cast(), size_of::<T>()) }
 }
 
-/// A payload from its bytes; `None` when they are too few or too many.
+/// Returns a payload from its bytes; `None` when they are too few or too many.
 fn from_bytes<T: Payload>(bytes: &[u8]) -> Option<T> {
     if bytes.len() != size_of::<T>() {
         return None;

@@ -33,7 +33,7 @@ pub struct LoopTraffic {
 }
 
 impl LoopTraffic {
-    /// A train of which no sample leaves before [`LoopTraffic::begin`].
+    /// Returns a train of which no sample leaves before [`LoopTraffic::begin`].
     pub fn new(plan: TrafficPlan, train: TrainId, start_ns: i64, seed: u64) -> Self {
         let random = Chance::new(seed ^ train.0.wrapping_mul(0x9e37_79b9_7f4a_7c15));
         let mut motion = DrivenMotion::of(train, start_ns);
@@ -47,7 +47,7 @@ impl LoopTraffic {
         self.appoint();
     }
 
-    /// The next sample, with the time in ns at which it is to leave, if there is one more.
+    /// Returns the next sample, with the time in ns at which it is to leave, if there is one more.
     pub fn upcoming(&self) -> Option<&(TrainSample, i64)> {
         (self.number < self.count).then_some(&self.next)
     }
@@ -119,13 +119,13 @@ pub struct DrivenMotion {
 }
 
 impl DrivenMotion {
-    /// The motion of a train from a time on, in ns of the controller's clock.
+    /// Returns the motion of a train from a time on, in ns of the controller's clock.
     pub fn of(train: TrainId, start_ns: i64) -> Self {
         let noise = train.0.wrapping_mul(0x9e37_79b9) | 1;
         DrivenMotion { train, start_ns, phase: train.0 as f64 * 0.37, noise }
     }
 
-    /// The sample at a time in ns of the controller's clock; every field is set.
+    /// Returns the sample at a time in ns of the controller's clock; every field is set.
     pub fn sample(&mut self, time_ns: i64) -> TrainSample {
         let elapsed_s = (time_ns - self.start_ns) as f64 * 1e-9;
         let rate = TAU / PERIOD_S;

@@ -115,7 +115,7 @@ pub struct OpenLoopTrial {
 }
 
 impl OpenLoopTrial {
-    /// Samples of which some pipeline gave no account.
+    /// Returns the samples of which some pipeline gave no account.
     pub fn missing(&self) -> u64 {
         self.pipelines.iter().map(TrialOutcome::missing).sum()
     }
@@ -206,7 +206,7 @@ fn measure(
 }
 
 impl Setting {
-    /// How many pipelines are polled.
+    /// Returns how many pipelines are polled.
     fn polled(&self) -> usize {
         match &self.answerer {
             Answerer::Daemon(pipelines, None) => pipelines.len(),
@@ -214,7 +214,7 @@ impl Setting {
         }
     }
 
-    /// The controller's end.
+    /// Returns the controller's end.
     fn wire(
         &self,
         site: &DaemonSite,

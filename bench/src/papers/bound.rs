@@ -47,7 +47,7 @@ struct Step {
     jacobian: Matrix4<f64>,
 }
 
-/// The bound at every scored moment, given the measurements up to `lag_steps` later.
+/// Returns the bound at every scored moment, given the measurements up to `lag_steps` later.
 pub fn bound(braking: &Braking, knowledge: PriorKnowledge, lag_steps: usize) -> Vec<BoundAt> {
     let moments = braking.nominal();
     let steps = forward(braking, knowledge, &moments);
@@ -71,7 +71,7 @@ pub fn bound(braking: &Braking, knowledge: PriorKnowledge, lag_steps: usize) -> 
     bounds
 }
 
-/// The known curve and its slope by speed, in units of the declared value.
+/// Returns the known curve and its slope by speed, in units of the declared value.
 fn shape(braking: &Braking, knowledge: PriorKnowledge, speed_mps: f64) -> (f64, f64) {
     let declared = declared(braking.sought);
     match (knowledge, braking.sought) {
@@ -87,7 +87,7 @@ fn shape(braking: &Braking, knowledge: PriorKnowledge, speed_mps: f64) -> (f64, 
     }
 }
 
-/// How the coefficient depends on the state.
+/// Returns how the coefficient depends on the state.
 fn coefficient_row(
     braking: &Braking,
     knowledge: PriorKnowledge,
@@ -134,7 +134,7 @@ fn forward(braking: &Braking, knowledge: PriorKnowledge, moments: &[BrakingMomen
     steps
 }
 
-/// A covariance made invertible where a component is known exactly.
+/// Returns a covariance made invertible where a component is known exactly.
 fn regular(mut covariance: Matrix4<f64>) -> Matrix4<f64> {
     if covariance[(DRIFT, DRIFT)] == 0.0 {
         covariance[(DRIFT, DRIFT)] = 1.0;
@@ -164,12 +164,12 @@ fn transition(
     jacobian
 }
 
-/// Root of the mean variance.
+/// Returns the root of the mean variance.
 pub fn deviation(bounds: &[BoundAt]) -> f64 {
     root_mean_square(bounds.iter().map(|bound| bound.std))
 }
 
-/// Mean of |error| / truth in % of a Gaussian error at the bound.
+/// Returns the mean of |error| / truth in % of a Gaussian error at the bound.
 pub fn mean_relative_percent(bounds: &[BoundAt]) -> f64 {
     100.0 * std::f64::consts::FRAC_2_PI.sqrt() * mean(bounds.iter().map(|it| it.std / it.truth))
 }

@@ -156,7 +156,7 @@ impl Braking {
         self.integrate(&mut Chance::new(seed), 1.0)
     }
 
-    /// The braking without process and measurement noise.
+    /// Returns the braking without process and measurement noise.
     pub fn nominal(&self) -> Vec<BrakingMoment> {
         self.integrate(&mut Chance::new(0), 0.0)
     }
@@ -211,7 +211,7 @@ impl Braking {
     }
 }
 
-/// The declared value of what is looked for; of adhesion, what the declared brake would need.
+/// Returns the declared value of what is looked for; of adhesion, what the declared brake would need.
 pub fn declared(sought: BrakingCoefficient) -> f64 {
     let train = train();
     let gear = DeclaredGear::of(&train.brake_gear).expect("a declared gear");

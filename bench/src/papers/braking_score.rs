@@ -30,7 +30,7 @@ pub const LAG_STEPS: usize = 25;
 /// Steps from the middle of a window to its end.
 pub const MIDDLE_STEPS: usize = WINDOW - 1 - WINDOW / 2;
 
-/// The sample that a pipeline sees at a moment.
+/// Returns the sample that a pipeline sees at a moment.
 fn resolved(train: &TrainModel, moment: &BrakingMoment, is_first: bool) -> ResolvedSample {
     ResolvedSample {
         time_ns: (moment.time_s * 1e9).round() as i64,
@@ -87,7 +87,7 @@ pub fn run<const LAGS: usize>(
     scored
 }
 
-/// The coefficient of a snapshot, be it a number or a bound.
+/// Returns the coefficient of a snapshot, be it a number or a bound.
 fn coefficient(snapshot: &ParameterSnapshot) -> Option<(f64, f64)> {
     use Parameter::{Adhesion, AdhesionLowerBound, BrakingRatio, DiscFriction};
     [Adhesion, AdhesionLowerBound, DiscFriction, BrakingRatio]
@@ -112,7 +112,7 @@ pub struct BrakingScore {
 }
 
 impl BrakingScore {
-    /// Root mean square error.
+    /// Returns the root mean square error.
     pub fn rmse(&self) -> f64 {
         root_mean_square(&self.errors.errors)
     }
@@ -129,7 +129,7 @@ impl BrakingScore {
         2.0 * nees * nees * runs / self.nees_run_variance()
     }
 
-    /// The same where all runs share one curve of the coefficient, given the score of runs that
+    /// Returns the same where all runs share one curve of the coefficient, given the score of runs that
     /// draw a curve each.
     ///
     /// The claimed variance counts with the curves that the estimator presumes; one curve is one
@@ -148,7 +148,7 @@ impl BrakingScore {
         PaperRow { nees_freedom: Some(freedom), ..self.errors.row(row) }
     }
 
-    /// The errors of runs, pooled.
+    /// Returns the errors of runs, pooled.
     pub fn of<'a>(runs: impl Iterator<Item = &'a Vec<ScoredBraking>>) -> Self {
         let (mut errors, mut relative, mut nees_of_runs) =
             (score::PaperScore::default(), Vec::new(), Vec::new());
@@ -191,7 +191,7 @@ fn reports(sought: BrakingCoefficient) -> BrakeFactor {
     }
 }
 
-/// The settings of a kind for adhesion, or of its like for what brakes are made of.
+/// Returns the settings of a kind for adhesion, or of its like for what brakes are made of.
 fn of_kind<S>(
     sought: BrakingCoefficient,
     settings: S,
@@ -203,20 +203,20 @@ fn of_kind<S>(
     }
 }
 
-/// The papers' EM, of which these settings are given.
+/// Returns the papers' EM, of which these settings are given.
 pub fn em(sought: BrakingCoefficient, given: EmSettings) -> EstimatorSettings {
     let settings = EmSettings { braking: braking_settings(), reports: reports(sought), ..given };
     of_kind(sought, settings, [EstimatorSettings::AdhesionEm, EstimatorSettings::BrakeEm])
 }
 
-/// The papers' baseline from an initial value.
+/// Returns the papers' baseline from an initial value.
 pub fn ekf(sought: BrakingCoefficient, initial: f64) -> EstimatorSettings {
     let (braking, initial, reports) = (braking_settings(), Some(initial), reports(sought));
     let settings = EkfSettings { braking, initial, reports, ..EkfSettings::default() };
     of_kind(sought, settings, [EstimatorSettings::AdhesionEkf, EstimatorSettings::BrakeEkf])
 }
 
-/// Our smoother.
+/// Returns our smoother.
 pub fn smoother(sought: BrakingCoefficient, lag_s: f64) -> EstimatorSettings {
     let (braking, reports) = (braking_settings(), reports(sought));
     let settings = SmootherSettings { braking, lag_s, reports, ..SmootherSettings::default() };
@@ -227,7 +227,7 @@ pub fn smoother(sought: BrakingCoefficient, lag_s: f64) -> EstimatorSettings {
     )
 }
 
-/// Our estimator where the curve over speed is known but for its scale.
+/// Returns our estimator where the curve over speed is known but for its scale.
 pub fn known_law(sought: BrakingCoefficient) -> EstimatorSettings {
     if sought == BrakingCoefficient::Adhesion {
         let settings = LawSettings { braking: braking_settings(), ..LawSettings::default() };
@@ -249,7 +249,7 @@ pub fn presumed(sought: BrakingCoefficient) -> ShareStep {
     SmootherSettings::default().walk(sought).into()
 }
 
-/// A braking whose coefficient is drawn from what the smoother presumes.
+/// Returns a braking whose coefficient is drawn from what the smoother presumes.
 pub fn drawn_braking(sought: BrakingCoefficient) -> Braking {
     let drawn = Some(presumed(sought));
     Braking { sought, drawn, from_kmh: 300.0, to_kmh: 180.0, scored_from_kmh: 265.0 }
@@ -260,7 +260,7 @@ mod tests {
     use super::*;
     use crate::papers::braking::{JIN_TABLE_3, STEP_S, XIE_TABLE_2, XIE_TABLE_3, declared};
 
-    /// Root mean square drift of the achieved share over the scored part of a braking.
+    /// Returns the root mean square drift of the achieved share over the scored part of a braking.
     fn drift_per_s(braking: &Braking) -> f64 {
         let moments = braking.nominal();
         let drifts: Vec<f64> = moments

@@ -42,17 +42,17 @@ struct Compared<'s> {
 }
 
 impl Table {
-    /// The initial value of a run.
+    /// Returns the initial value of a run.
     pub fn initial(&self, seed: u64) -> f64 {
         self.initials[seed as usize % self.initials.len()]
     }
 
-    /// A row without figures.
+    /// Returns a row without figures.
     pub fn row(&self, what: &str, unit: &'static str, seeds: Seeds) -> PaperRow {
         PaperRow::new(self.paper, self.table, format!("{}, {what}", self.name), unit, seeds)
     }
 
-    /// The rows that every table has: the present, 5 s back, and the baseline on its own.
+    /// Returns the rows that every table has: the present, 5 s back, and the baseline on its own.
     pub fn comparison(&self, seeds: Seeds) -> Vec<PaperRow> {
         let sought = self.braking.sought;
         let lags = [0, MIDDLE_STEPS];
@@ -99,7 +99,7 @@ impl Table {
         rows
     }
 
-    /// The rows where the curve over speed is known but for its scale.
+    /// Returns the rows where the curve over speed is known but for its scale.
     pub fn known_law(&self, scale_std: f64, seeds: Seeds) -> Vec<PaperRow> {
         let sought = self.braking.sought;
         let [score] = score(&self.braking, seeds, [0], |_| known_law(sought));
@@ -112,7 +112,7 @@ impl Table {
         )
     }
 
-    /// A row of mean relative errors and one of root mean square errors.
+    /// Returns a row of mean relative errors and one of root mean square errors.
     fn pair(
         &self,
         what: &str,
@@ -142,7 +142,7 @@ impl Table {
     }
 }
 
-/// Our smoother over runs that each draw a coefficient from its own model.
+/// Returns our smoother over runs that each draw a coefficient from its own model.
 pub fn drawn_score(
     sought: BrakingCoefficient,
     lag_s: f64,
@@ -153,7 +153,7 @@ pub fn drawn_score(
     score
 }
 
-/// Rows in which the coefficient is drawn from the very model of the smoother, so that bound,
+/// Returns the rows in which the coefficient is drawn from the very model of the smoother, so that bound,
 /// coverage and NEES apply without reservation.
 pub fn drawn_rows(
     paper: &'static str,

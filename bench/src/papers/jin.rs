@@ -46,7 +46,7 @@ pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     rows
 }
 
-/// A ratio that hardly moves gains from a window of 40 s, and the declared value is hard to beat.
+/// Returns a ratio that hardly moves gains from a window of 40 s, and the declared value is hard to beat.
 fn ratio_extras(seeds: Seeds) -> Vec<PaperRow> {
     // 10 s back, the random walk of 0.4 % after 1 s remembers about as long on either side.
     let [back] = score(&RATIO.braking, seeds, [50], |_| smoother(BrakingCoefficient::Ratio, 10.0));
@@ -68,7 +68,7 @@ fn ratio_extras(seeds: Seeds) -> Vec<PaperRow> {
     }]
 }
 
-/// The stop from 350 km/h of figure 8.
+/// Returns the stop from 350 km/h of figure 8.
 fn stop() -> [PaperRow; 2] {
     let train = train();
     let gear = DeclaredGear::of(&train.brake_gear).expect("a declared gear");

@@ -10,7 +10,7 @@ use std::cell::Cell;
 
 use dynocar_core::filter::particle::{ParticleError, ParticleModel, ParticleSmoother};
 use dynocar_core::filter::random::Random;
-use dynocar_core::pipeline::braking::law_bank::BrakingLaw;
+use dynocar_core::pipeline::braking::law::BrakingLaw;
 use dynocar_core::pipeline::braking::motion::{self, StepInputs};
 use dynocar_model::train::TrainModel;
 
@@ -97,7 +97,7 @@ impl ParticleModel<2> for UniformWindow<'_> {
     }
 }
 
-/// The changes of the adhesion, from lowest to highest, under which Q of the first window stays
+/// Returns the changes of the adhesion, from lowest to highest, under which Q of the first window stays
 /// finite.
 fn finite_changes(
     moments: &[BrakingMoment],

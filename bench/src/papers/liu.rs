@@ -39,7 +39,7 @@ const PUBLISHED_VARIANCES: [f64; 5] = [0.5632, 0.5632, 0.5623, 0.5618, 0.5613];
 /// Coefficients with their covariance, for speeds in m/s.
 type Estimate = (Davis, Matrix3<f64>);
 
-/// Rows for every method under every condition, over seeded runs.
+/// Returns the rows for every method under every condition, over seeded runs.
 pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     let (mut rows, mut table_1) = (Vec::new(), Vec::new());
     for condition in CONDITIONS {
@@ -53,8 +53,8 @@ pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     rows
 }
 
-/// Errors of w0 under a condition; and Table 1's last column, the variance of the segments' residuals, of which the
-/// paper's are of its own recorded data, so that only the order of the methods compares.
+/// Returns the errors of w0 under a condition; and Table 1's last column, the variance of the segments' residuals, of
+/// which the paper's are of its own recorded data, so that only the order of the methods compares.
 fn of_condition(condition: RunCondition, seeds: Seeds) -> (Vec<PaperRow>, Vec<PaperRow>) {
     let mut of_methods = vec![(Vec::new(), Vec::new()); METHODS.len()];
     let (mut ours, mut online, mut our_variances) =
@@ -104,7 +104,7 @@ fn of_condition(condition: RunCondition, seeds: Seeds) -> (Vec<PaperRow>, Vec<Pa
     (rows, table_1.collect())
 }
 
-/// Our fit of whole runs: the computed speed against the measured one, all along each run.
+/// Returns our fit of whole runs: the computed speed against the measured one, all along each run.
 fn whole_runs(runs: &[Vec<MeasuredRun>]) -> Option<Estimate> {
     let step = |pair: &[MeasuredRun]| TrajectoryStep {
         size: pair[1].time_s - pair[0].time_s,
@@ -127,7 +127,7 @@ fn whole_runs(runs: &[Vec<MeasuredRun>]) -> Option<Estimate> {
     Some((fit.davis, fit.covariance))
 }
 
-/// The live pipeline over the same samples, with its default settings.
+/// Returns the live pipeline over the same samples, with its default settings.
 fn live(runs: &[Vec<MeasuredRun>]) -> Estimate {
     // Declared wrongly, as in practice.
     let declared = Davis { a: 1.5, b: 0.03, c: 0.012 };

@@ -98,7 +98,7 @@ impl PapersArguments {
     }
 }
 
-/// A row for people and for a file of CSV.
+/// Returns a row for people and for a file of CSV.
 fn record(row: &PaperRow, verdict: &PromiseVerdict) -> Record {
     let mut notes: Vec<String> =
         Some(row.note.clone()).filter(|it| !it.is_empty()).into_iter().collect();

@@ -141,7 +141,7 @@ impl PromiseVerdict {
     }
 }
 
-/// The band of a chi-square over its degrees of freedom.
+/// Returns the band of a chi-square over its degrees of freedom.
 fn nees_band(freedom: f64) -> (f64, f64) {
     let distribution = ChiSquared::new(freedom).expect("degrees of freedom above 0");
     let at = |probability| distribution.inverse_cdf(probability) / freedom;

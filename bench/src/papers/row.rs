@@ -43,7 +43,7 @@ pub struct PaperRow {
 }
 
 impl PaperRow {
-    /// A row without figures.
+    /// Returns a row without figures.
     pub fn new(
         paper: &'static str,
         table: &'static str,
@@ -77,7 +77,7 @@ impl Seeds {
         Seeds { first: 0, count }
     }
 
-    /// The seeds.
+    /// Returns the seeds.
     pub fn range(self) -> Range<u64> {
         self.first..self.first + self.count as u64
     }

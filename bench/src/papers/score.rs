@@ -1,4 +1,4 @@
-//! Errors of a method over the seeds, with what the method and the bound say of them.
+//! Errors of a method over the seeds, its own standard deviations, and the bound.
 
 use dynocar_model::train::Davis;
 use dynocar_shared::HALF_95;
@@ -57,13 +57,13 @@ impl PaperScore {
         self.bounds.extend(speeds_mps.iter().map(|&speed_mps| w0_std(covariance, speed_mps)));
     }
 
-    /// Mean normalised estimation error squared, per degree of freedom.
+    /// Returns the mean normalised estimation error squared, per degree of freedom.
     pub fn nees(&self) -> f64 {
         mean(&self.nees)
     }
 
-    /// A row of root mean square errors, with coverage and consistency of ours; the row's own figures stay where there is
-    /// none.
+    /// Returns a row of root mean square errors, with coverage and consistency of ours; the row's own figures stay
+    /// where there is none.
     pub fn row(&self, row: PaperRow) -> PaperRow {
         let rms = |of: &[f64]| (!of.is_empty()).then(|| root_mean_square(of));
         let is_judged = !self.covered.is_empty();
@@ -79,7 +79,7 @@ impl PaperScore {
         }
     }
 
-    /// A row of mean errors with their sign; intervals say nothing of a bias.
+    /// Returns a row of mean errors with their sign; intervals say nothing of a bias.
     pub fn bias(&self, row: PaperRow) -> PaperRow {
         PaperRow {
             paper_method: Some(mean(&self.paper)),
@@ -90,12 +90,12 @@ impl PaperScore {
     }
 }
 
-/// Errors of w0 in N/kN at some speeds in m/s.
+/// Returns the errors of w0 in N/kN at some speeds in m/s.
 pub fn w0_errors(found: &Davis, truth: &Davis, speeds_mps: &[f64]) -> Vec<f64> {
     speeds_mps.iter().map(|&speed| found.w0_n_per_kn(speed) - truth.w0_n_per_kn(speed)).collect()
 }
 
-/// Standard deviation of w0 in N/kN at a speed in m/s.
+/// Returns the standard deviation of w0 in N/kN at a speed in m/s.
 pub fn w0_std(covariance: &Matrix3<f64>, speed_mps: f64) -> f64 {
     let powers = Vector3::new(1.0, speed_mps, speed_mps * speed_mps);
     powers.dot(&(covariance * powers)).max(0.0).sqrt()

@@ -1,7 +1,7 @@
 //! Wang 2022: staged learning of resistance and mass, traction energy.
 //!
 //! - [`shuttle`], [`ride`]: the scenario, from line to samples
-//! - [`bound`]: what no estimator can beat
+//! - [`bound`]: the Cramér–Rao bounds
 //! - [`resistance_rows`], [`mass_rows`], [`energy_rows`]: the comparison
 
 mod bound;
@@ -13,7 +13,7 @@ mod shuttle;
 
 use super::row::{PaperRow, Seeds};
 
-/// Every row of the paper over a number of seeded runs.
+/// Returns every row of the paper over a number of seeded runs.
 ///
 /// Rows that take a whole crossing at once, or that hardly scatter, take 20 runs at most;
 /// each row says how many.

@@ -10,7 +10,7 @@ mod scenario;
 
 use super::row::{PaperRow, Seeds};
 
-/// Every line of the comparison for this paper.
+/// Returns every line of the comparison for this paper.
 ///
 /// `seeds` runs each; where the paper's method goes over a whole line of 120 km window by window
 /// it gets a tenth of them, as the line says.

@@ -162,7 +162,7 @@ pub fn stop_rows(
     })
 }
 
-/// The papers' recursion, Xie 2019, eq. (2)-(3) with the position corrected: metres and seconds.
+/// Returns the papers' recursion, Xie 2019, eq. (2)-(3) with the position corrected: metres and seconds.
 fn stop_in_steps(train: &TrainModel, stop: &Stop<'_>, brake_n: impl Fn(f64) -> f64) -> [f64; 2] {
     let weight_kn = 1e-3 * train.mass_kg * stop.gravity_mps2;
     let (mut distance_m, mut time_s, mut speed_mps) = (0.0, 0.0, stop.from_speed_mps);

@@ -35,7 +35,7 @@ pub struct CoreArguments {
 }
 
 impl Cores {
-    /// The cores asked for, else the first two; on a machine with one core both are the same.
+    /// Returns the cores asked for, else the first two; on a machine with one core both are the same.
     pub fn choose(asked: &CoreArguments) -> Self {
         let count = std::thread::available_parallelism().map_or(1, usize::from);
         let controller = asked.controller_core.unwrap_or(0);

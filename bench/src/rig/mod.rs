@@ -3,8 +3,8 @@
 //! - [`site`]: a run-time directory with a daemon, gone afterwards
 //! - [`cores`]: cores and priorities
 //! - [`pipelines`]: which pipelines a measurement names
-//! - [`quantiles`]: histograms and what is reported of them
-//! - [`usage`]: what the kernel says of a process: processor time, memory, waits
+//! - [`quantiles`]: histograms and their reported quantiles
+//! - [`usage`]: the kernel's counters of a process: processor time, memory, waits
 
 pub mod cores;
 pub mod pipelines;

@@ -1,4 +1,4 @@
-//! Which pipelines a measurement names.
+//! The pipelines that a measurement names.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use dynocar_shared::{PipelineKind, TrainId, TrainSample};
 
 use crate::output::{BenchError, named};
 
-/// A pipeline of a kind with its default settings.
+/// Returns a pipeline of a kind with its default settings.
 ///
 /// # Panics
 ///
@@ -40,12 +40,12 @@ pub fn resolving(
     move |sample| Some(resolver.resolve(&admission.validate(sample).ok()?))
 }
 
-/// Every pipeline that estimates and whose step is short: they may share a thread.
+/// Returns every pipeline that estimates and whose step is short: they may share a thread.
 pub fn fast() -> Vec<PipelineKind> {
     estimating().filter(|&kind| !is_slow(kind)).collect()
 }
 
-/// Every pipeline that now and then computes for long: they get threads of their own.
+/// Returns every pipeline that now and then computes for long: they get threads of their own.
 pub fn slow() -> Vec<PipelineKind> {
     estimating().filter(|&kind| is_slow(kind)).collect()
 }
@@ -57,7 +57,7 @@ fn estimating() -> impl Iterator<Item = PipelineKind> {
         .filter(|&kind| kind != PipelineKind::Echo && EstimatorSettings::default_of(kind).is_some())
 }
 
-/// The pipelines of a list of names; `fast`, `slow` and `all` are groups.
+/// Returns the pipelines of a list of names; `fast`, `slow` and `all` are groups.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! Histograms of latencies, and what is reported of them.
+//! Histograms of latencies, and their reported quantiles.
 
 use hdrhistogram::Histogram;
 
@@ -7,7 +7,7 @@ use crate::output::Record;
 /// The longest latency resolved, in ns.
 const LONGEST_NS: u64 = 60_000_000_000;
 
-/// A histogram of latencies from 1 ns to a minute, to three digits.
+/// Returns a histogram of latencies from 1 ns to a minute, to three digits.
 ///
 /// # Panics
 ///
@@ -21,7 +21,7 @@ pub fn record(histogram: &mut Histogram<u64>, latency_ns: i64) {
     histogram.saturating_record(latency_ns.clamp(1, LONGEST_NS as i64) as u64);
 }
 
-/// Cells of a table: the quantiles of latencies.
+/// Returns the cells of a table: the quantiles of latencies.
 pub fn cells(record: Record, of: &Histogram<u64>) -> Record {
     let at = |quantile: f64| of.value_at_quantile(quantile);
     [
@@ -35,7 +35,7 @@ pub fn cells(record: Record, of: &Histogram<u64>) -> Record {
     .fold(record, |record, (name, ns)| record.shown(name, for_people(ns as f64), ns))
 }
 
-/// All of some histograms with the bounds of [`histogram`].
+/// Returns all of some histograms with the bounds of [`histogram`].
 pub fn pooled<'a>(histograms: impl IntoIterator<Item = &'a Histogram<u64>>) -> Histogram<u64> {
     let mut all = histogram();
     for own in histograms {
@@ -45,7 +45,7 @@ pub fn pooled<'a>(histograms: impl IntoIterator<Item = &'a Histogram<u64>>) -> H
     all
 }
 
-/// A time in ns for people: `812 ns`, `4.31 µs`, `2.20 ms`.
+/// Returns a time in ns for people: `812 ns`, `4.31 µs`, `2.20 ms`.
 pub fn for_people(ns: f64) -> String {
     match ns {
         ns if ns < 1e3 => format!("{ns:.0} ns"),

@@ -94,7 +94,7 @@ impl DaemonPlan {
     }
 }
 
-/// A new site with the train that latency and load drive.
+/// Returns a new site with the train that latency and load drive.
 pub fn site() -> DaemonSite {
     let site = DaemonSite::new();
     site.write("train.toml", TRAIN);

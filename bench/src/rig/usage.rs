@@ -15,7 +15,7 @@ pub struct ProcessUsage {
     pub preempted: u64,
 }
 
-/// The usage of a process, of which one thread is named; zeros where it, or such a thread, is not there.
+/// Returns the usage of a process, of which one thread is named; zeros where it, or such a thread, is not there.
 pub fn of(process_id: u32, thread: &str) -> ProcessUsage {
     let folder = format!("/proc/{process_id}");
     let tasks = std::fs::read_dir(format!("{folder}/task")).into_iter().flatten().flatten();
@@ -38,7 +38,7 @@ fn number(text: Option<&str>) -> u64 {
     text.and_then(|it| it.trim().parse().ok()).unwrap_or(0)
 }
 
-/// A figure of `/proc/…/schedstat`: time on a processor, or ready and waiting for one, in ns.
+/// Returns a figure of `/proc/…/schedstat`: time on a processor, or ready and waiting for one, in ns.
 fn schedule_ns(task: &Path, index: usize) -> f64 {
     let text = std::fs::read_to_string(task.join("schedstat")).unwrap_or_default();
     number(text.split(' ').nth(index)) as f64

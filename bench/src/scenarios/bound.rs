@@ -1,4 +1,4 @@
-//! How well resistance and mass can be known at best: the joint Cramér–Rao bound of a drive.
+//! The joint Cramér–Rao bound of resistance and mass over a drive: no estimator knows both better.
 //!
 //! All that [`World::draw`] draws is unknown at once, each with the variance that it is drawn with:
 //! a, b, c, the loads, the scales and the delay of forces, brakes from stop to stop, wheels, rotating
@@ -40,7 +40,7 @@ enum Unknown {
 }
 
 impl Unknown {
-    /// Its standard deviation beforehand.
+    /// Returns its standard deviation beforehand.
     fn std(self, world: &World) -> f64 {
         let (declared, usual) = (world.declared.resistance, &world.mistakes);
         let declared_kg = world.declared.mass_kg;
@@ -224,7 +224,7 @@ impl Bound {
         self.sensitivity[wheel] = 0.0;
     }
 
-    /// The least covariance of a, b, c in N/kN by powers of m/s and of the load, as a share of it.
+    /// Returns the least covariance of a, b, c in N/kN by powers of m/s and of the load, as a share of it.
     ///
     /// `None` without noise, where nothing limits it.
     pub fn covariance(&mut self, world: &World) -> Option<Matrix4<f64>> {

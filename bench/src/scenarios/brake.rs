@@ -45,7 +45,7 @@ impl Brake {
     const BLENDED: Brake = Brake { hand_over_mps: (1.0, 3.0), jerk_mps3: 1.4, ..Brake::AS_TOLD };
     const ALONE: (f64, f64) = (f64::INFINITY, f64::INFINITY);
 
-    /// Rows of brakes with their names.
+    /// Returns the rows of brakes with their names.
     pub fn rows() -> [(&'static str, Brake); 15] {
         let blended = |lag_s, strength| Brake { lag_s, strength, ..Brake::BLENDED };
         let alone =
@@ -93,7 +93,7 @@ pub struct Friction {
 }
 
 impl Friction {
-    /// Acceleration in m/s² of the demand, after a step in s at a speed in m/s.
+    /// Returns the acceleration in m/s² of the demand, after a step in s at a speed in m/s.
     pub fn acts_mps2(&mut self, brake: &Brake, told_mps2: f64, speed_mps: f64, step_s: f64) -> f64 {
         let braked_mps2 = (-told_mps2).max(0.0);
         let share = brake.friction_share(speed_mps);
@@ -107,7 +107,7 @@ impl Friction {
         PRESSURE_PA_PER_MPS2 * self.by_pressure_mps2
     }
 
-    /// Share of the force that is electric at a speed in m/s.
+    /// Returns the share of the force that is electric at a speed in m/s.
     pub fn electric_share(brake: &Brake, speed_mps: f64) -> f64 {
         1.0 - brake.friction_share(speed_mps)
     }

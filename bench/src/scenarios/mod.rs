@@ -3,10 +3,10 @@
 //!
 //! - [`world`]: a train, its line and its day, with the size of the mistakes in their declaration
 //! - [`brake`]: brakes that do not act as they report
-//! - [`scenario_train`]: driving from stop to stop, and what the controller writes of it
+//! - [`scenario_train`]: driving from stop to stop, and the controller's samples
 //! - [`recorded`]: the same as a dataset
 //! - [`bound`]: how well both can be known at best
-//! - [`score`]: what an answer was worth over a drive
+//! - [`score`]: scores of answers over a drive
 //! - [`table`]: the scenarios, all of it in numbers
 
 pub mod bound;

@@ -1,4 +1,4 @@
-//! A drive as a dataset that `dynocar explain` reads: what the controller wrote of it, in runs.
+//! A drive as a dataset that `dynocar explain` reads: the controller's samples, in runs.
 
 use std::fmt::Write as _;
 use std::fs;

@@ -1,4 +1,4 @@
-//! Driving from stop to stop, and what the controller writes of it.
+//! Driving from stop to stop, and the samples that the controller writes.
 
 use std::collections::VecDeque;
 
@@ -109,7 +109,7 @@ impl ScenarioTrain {
         drive
     }
 
-    /// The world that it drives in.
+    /// Returns the world that it drives in.
     pub fn world(&self) -> &World {
         &self.world
     }

@@ -125,17 +125,17 @@ impl QuantityScore {
 pub struct Scores<'a>(pub &'a [QuantityScore]);
 
 impl Scores<'_> {
-    /// The sum of a count over all drives.
+    /// Returns the sum of a count over all drives.
     pub fn count(&self, of: fn(&QuantityScore) -> u64) -> u64 {
         self.0.iter().map(of).sum()
     }
 
-    /// A count as a share of the cycles with a usable answer, in %.
+    /// Returns a count as a share of the cycles with a usable answer, in %.
     pub fn percent(&self, of: fn(&QuantityScore) -> u64) -> f64 {
         100.0 * self.count(of) as f64 / self.count(|it| it.usable).max(1) as f64
     }
 
-    /// Root of a mean square over the usable answers, in % of the truth; no number where none was usable.
+    /// Returns the root of a mean square over the usable answers, in % of the truth; no number where none was usable.
     pub fn rms_percent(&self, of: fn(&QuantityScore) -> f64) -> f64 {
         100.0 * (self.sum(of) / self.count(|it| it.usable) as f64).sqrt()
     }

@@ -41,7 +41,7 @@ pub fn scenarios() -> Vec<NamedScenario> {
     TRAFFIC.into_iter().map(|(name, traffic)| (name.to_owned(), traffic)).flat_map(of).collect()
 }
 
-/// Rows of brakes: for a tram and each other traffic each brake, with a good and a poor map.
+/// Returns the rows of brakes: for a tram and each other traffic each brake, with a good and a poor map.
 pub fn brakes() -> Vec<NamedScenario> {
     let mut all = Vec::new();
     for (name, traffic) in [("tram", Traffic::Tram)].into_iter().chain(TRAFFIC) {
@@ -129,7 +129,7 @@ pub fn run(plan: &Plan<'_>) -> Result<Vec<Record>, SettingError> {
     Ok(rows.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
 }
 
-/// The settings that a user of the scenario has: load and map are known exactly where they are.
+/// Returns the settings that a user of the scenario has: load and map are known exactly where they are.
 fn settings(kind: PipelineKind, scenario: &Scenario) -> Option<EstimatorSettings> {
     let mut settings = EstimatorSettings::default_of(kind)?;
     if let EstimatorSettings::TrainKalman(own) = &mut settings {
@@ -202,7 +202,7 @@ fn driven(mut pipeline: Pipeline, world: World, hours: f64) -> [QuantityScore; 2
     scores
 }
 
-/// The resistance at the speed driven or the mass, if a snapshot may be used for it.
+/// Returns the resistance at the speed driven or the mass, if a snapshot may be used for it.
 fn answer(
     snapshot: &ParameterSnapshot,
     quantity: Quantity,
@@ -221,7 +221,7 @@ fn answer(
     Some(Answer::of(found, truth, truth))
 }
 
-/// The least relative deviation of a quantity by the bound of the drive.
+/// Returns the least relative deviation of a quantity by the bound of the drive.
 fn least_deviation(bound: &Matrix4<f64>, quantity: Quantity, moment: &DriveMoment) -> f64 {
     let v = moment.speed_mps;
     let row = match quantity {

@@ -1,4 +1,4 @@
-//! A train, its line, and the ordinary mistakes in what is declared of them.
+//! A train, its line, and the usual mistakes in their declaration.
 
 use dynocar_core::pipeline::train_kalman::TrainKalmanSettings;
 use dynocar_model::terms::{adhesion, wind};
@@ -79,7 +79,7 @@ pub struct Habits {
 }
 
 impl Traffic {
-    /// Its habits.
+    /// Returns its habits.
     pub fn habits(self) -> Habits {
         let habits =
             |stop_m, top_mps, acceleration_mps2, standing_s, line_m, steep_permille| Habits {
@@ -100,7 +100,7 @@ impl Traffic {
         }
     }
 
-    /// The train as declared.
+    /// Returns the train as declared.
     pub fn declared(self) -> TrainModel {
         let (mass_kg, length_m, [a, b, c]) = match self {
             Traffic::Metro => (230e3, 120.0, [2.1, 0.02, 0.0016]),
@@ -132,7 +132,7 @@ pub const GUST_S: f64 = 20.0;
 /// Standard deviation at knots of what straight lines between them carry on with that of 1.
 pub const KNOT_OVER_MEAN: f64 = 1.22;
 
-/// Standard deviation in ‰ of the map's error at a knot where it is that much on the average: straight
+/// Returns the standard deviation in ‰ of the map's error at a knot where it is that much on the average: straight
 /// lines between knots vary less.
 pub fn knot_std_permille(map_std_permille: f64) -> f64 {
     KNOT_OVER_MEAN * map_std_permille
@@ -220,7 +220,7 @@ impl World {
         }
     }
 
-    /// The stop after one, and the direction there: at either end of the line the train turns.
+    /// Returns the stop after one, and the direction there: at either end of the line the train turns.
     pub fn after_stop(&self, stop: usize, direction: f64) -> (usize, f64) {
         let direction = match stop {
             0 if direction < 0.0 => 1.0,
@@ -230,7 +230,7 @@ impl World {
         ((stop as f64 + direction) as usize, direction)
     }
 
-    /// Gradient in ‰ along growing chainage by the map and in truth, under a train whose centre is here.
+    /// Returns the gradient in ‰ along growing chainage by the map and in truth, under a train whose centre is here.
     pub fn gradient_permille(&self, centre_m: f64) -> [f64; 2] {
         let place = (centre_m / PIECE_M).clamp(0.0, (self.gradient.len() - 2) as f64);
         let (index, share) = (place as usize, place.fract());

@@ -17,7 +17,7 @@ use pyo3::prelude::*;
 
 use crate::calls::of_channel;
 
-/// Who serves a train, as a number and in words.
+/// Returns who serves a train, as a number and in words.
 #[pyfunction]
 pub(crate) fn daemon_state(
     py: Python<'_>,
@@ -32,19 +32,19 @@ pub(crate) fn daemon_state(
     Ok((state as i32, words))
 }
 
-/// The host's monotonic clock in ns.
+/// Returns the host's monotonic clock in ns.
 #[pyfunction]
 pub(crate) fn monotonic_now_ns() -> i64 {
     dynocar_client::monotonic_now_ns()
 }
 
-/// The release.
+/// Returns the release.
 #[pyfunction]
 pub(crate) fn version() -> &'static str {
     env!("CARGO_PKG_VERSION")
 }
 
-/// The unit of a parameter's value; empty where it has none, or where the parameter is not known.
+/// Returns the unit of a parameter's value; empty where it has none, or where the parameter is not known.
 #[pyfunction]
 pub(crate) fn parameter_unit(number: u32) -> &'static str {
     Parameter::from_number(number).map_or("", |it| unit_of(it.full_name()))
@@ -56,7 +56,7 @@ pub(crate) fn effect_words(kind: &str, intervals_m: Vec<[f64; 2]>) -> (String, S
     (words::kind_name(kind).into(), words::stretches(&intervals_m))
 }
 
-/// The meaning of an effect's parameter.
+/// Returns the meaning of an effect's parameter.
 #[pyfunction]
 pub(crate) fn parameter_words(name: &str) -> &str {
     words::parameter(name).0
@@ -71,7 +71,7 @@ pub(crate) fn layouts() -> (u32, u64, u64) {
 /// The members of a vocabulary: their names as in Rust, and their numbers.
 type Members = Vec<(String, i64)>;
 
-/// Every vocabulary with its members.
+/// Returns every vocabulary with its members.
 #[pyfunction]
 pub(crate) fn vocabularies() -> Vec<(&'static str, Members)> {
     fn members<V: Debug + Copy>(all: &[V], number: impl Fn(V) -> i64) -> Members {

@@ -130,7 +130,7 @@ impl Reader {
 }
 
 impl Reader {
-    /// A reading, or the code that says why there is none.
+    /// Returns a reading, or the code that says why there is none.
     fn pick(
         &self,
         py: Python<'_>,

@@ -38,7 +38,7 @@ pub(crate) trait End: Sized + 'static {
     /// Name in messages.
     const NAME: &'static str;
 
-    /// Those that this thread opened.
+    /// Returns those that this thread opened.
     fn of_this_thread() -> &'static LocalKey<Ends<Self>>;
 }
 
@@ -94,7 +94,7 @@ impl<E: End> Handle<E> {
         done.ok_or_else(|| PyValueError::new_err(format!("the {} is closed", E::NAME)))
     }
 
-    /// The same where it may take time: other threads of Python go on meanwhile.
+    /// Returns the same where it may take time: other threads of Python go on meanwhile.
     pub(crate) fn with_patience<R: Send>(
         &self,
         py: Python<'_>,

@@ -1,10 +1,10 @@
-//! The native half of the Python package `dynocar`, its module `dynocar._native`: what users import is
-//! written in Python beside it (`dynocar/`).
+//! The native half of the Python package `dynocar`, its module `dynocar._native`. Users import the half that is written
+//! in Python (`dynocar/`).
 //!
 //! # Layout
 //!
 //! - [`ends`]: ends of channels, each kept in the thread that opened it
-//! - [`channel`]: publisher and reader, [`snapshot`]: what a reader gives
+//! - [`channel`]: publisher and reader, [`snapshot`]: results of a reader
 //! - [`stopping`]: braking distance and time with a bound
 //! - [`about`]: clock, versions, who serves a train, vocabularies
 //! - [`calls`]: failures as the exceptions of `dynocar/_errors.py`; long work that Ctrl-C ends

@@ -25,12 +25,12 @@ use crate::table::Table;
 /// An answer as JSON and in words.
 pub(crate) type JsonAndText = (String, String);
 
-/// An answer for machines, as the command line gives it.
+/// Returns an answer for machines, as the command line gives it.
 pub(crate) fn json(answer: &impl Serialize) -> Result<String, Failure> {
     serde_json::to_string(answer).map_err(|error| Failure::Output(OutputError::Json(error)))
 }
 
-/// A path and the train that is meant.
+/// Returns a path and the train that is meant.
 fn of(path: &Path, train: Option<u64>) -> DatasetSource<'_> {
     DatasetSource { path, train: train.map(TrainId) }
 }
@@ -53,7 +53,7 @@ pub(crate) fn check(py: Python<'_>, path: PathBuf, train: Option<u64>) -> PyResu
     answer.map_err(|failure: Failure| of_failure(py, &failure))
 }
 
-/// A dataset: what `check` says of it, and the tables of its runs and of all of them.
+/// Returns a dataset: what `check` says of it, and the tables of its runs and of all of them.
 #[pyfunction]
 pub(crate) fn read(
     py: Python<'_>,
@@ -135,7 +135,7 @@ impl Explained {
         command::text(&self.explanation.answer)
     }
 
-    /// The report, one page of HTML.
+    /// Returns the report, one page of HTML.
     fn page(&self, py: Python<'_>) -> PyResult<String> {
         let DatasetSource { path, train } = self.runs.source();
         let mut arguments = vec!["explain".to_owned(), path.display().to_string()];
@@ -155,7 +155,7 @@ impl Explained {
         drawn.map_err(|error| of_failure(py, &Failure::work(error)))
     }
 
-    /// Speeds that the updated model predicts, by run.
+    /// Returns the speeds that the updated model predicts, by run.
     fn predictions(&self, py: Python<'_>) -> PyResult<Vec<(String, Table)>> {
         let runs = &self.runs.dataset.runs;
         let of_role = |role| (0..runs.len()).filter(move |index| runs[*index].role == role);

@@ -53,7 +53,7 @@ impl Reading {
         self.copy.use_state() as u32
     }
 
-    /// Why the state of use is what it is.
+    /// Returns why the state of use is what it is.
     #[getter]
     fn why(&self) -> &'static str {
         self.copy.why()
@@ -74,7 +74,7 @@ pub(crate) struct ParameterSnapshot(dynocar_shared::ParameterSnapshot);
 
 #[pymethods]
 impl ParameterSnapshot {
-    /// A field by its name: a number, or a list of them.
+    /// Returns a field by its name: a number, or a list of them.
     fn __getattr__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         let field = snapshot_fields().find(|it| it.layout.name == name).ok_or_else(|| {
             PyAttributeError::new_err(format!("'ParameterSnapshot' has no field '{name}'"))
@@ -102,7 +102,7 @@ impl ParameterSnapshot {
         }
     }
 
-    /// The bytes as they lie in shared memory, which `numpy.frombuffer` reads by `SNAPSHOT_DTYPE`.
+    /// Returns the bytes as they lie in shared memory, which `numpy.frombuffer` reads by `SNAPSHOT_DTYPE`.
     fn __bytes__<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
         let mut bytes = Vec::with_capacity(size_of_val(&self.0));
         for field in snapshot_fields() {

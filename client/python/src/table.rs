@@ -46,7 +46,7 @@ pub(crate) struct Table(Vec<RecordBatch>);
 
 #[pymethods]
 impl Table {
-    /// The table that a pickle has kept.
+    /// Returns the table that a pickle has kept.
     #[new]
     fn kept(batches: Vec<Kept<Vec<u8>>>) -> PyResult<Self> {
         let numbers = |bytes: &[u8]| {
@@ -76,7 +76,7 @@ impl Table {
         (slf.get_type(), (slf.get().0.iter().map(kept).collect(),))
     }
 
-    /// The columns of numbers of the first batch, with their names.
+    /// Returns the columns of numbers of the first batch, with their names.
     fn columns(&self) -> Vec<(String, Column)> {
         let Some(batch) = self.0.first() else { return Vec::new() };
         let named = batch.schema_ref().fields().iter().zip(batch.columns());
@@ -92,7 +92,7 @@ impl Table {
         self.0.iter().map(RecordBatch::num_rows).sum()
     }
 
-    /// A consumer that wants another schema casts by itself, as the protocol allows.
+    /// Returns a consumer that wants another schema casts by itself, as the protocol allows.
     #[pyo3(signature = (requested_schema=None))]
     fn __arrow_c_stream__<'py>(
         &self,
@@ -109,12 +109,12 @@ impl Table {
 }
 
 impl Table {
-    /// A table of one interval of time.
+    /// Returns a table of one interval of time.
     pub(crate) fn of(columns: Columns) -> PyResult<Self> {
         Ok(Table(vec![batch(None, columns)?]))
     }
 
-    /// The table of each run, and of all of them with a column that numbers the runs. They hold the
+    /// Returns the table of each run, and of all of them with a column that numbers the runs. They hold the
     /// quantities of which any run has a value.
     pub(crate) fn of_runs(runs: &[Run]) -> PyResult<(Vec<Self>, Self)> {
         let samples = runs.iter().flat_map(|run| &run.samples);

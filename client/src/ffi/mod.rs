@@ -7,7 +7,7 @@
 //! # Layout
 //!
 //! - [`error`]: codes, messages, and the wall that panics do not pass
-//! - [`handle`]: what a `dynocar_publisher *` or a `dynocar_reader *` points to
+//! - [`handle`]: the target of a `dynocar_publisher *` or a `dynocar_reader *`
 //! - [`publisher`], [`reader`]: the two ends a controller holds
 //! - [`snapshot`]: resistance, parameters and covariances out of a copied snapshot
 //! - [`stopping`]: braking distance and time with a bound

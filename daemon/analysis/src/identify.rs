@@ -12,13 +12,13 @@ use dynocar_shared::{
 
 use crate::dataset::{Dataset, Run};
 
-/// The samples of all runs, in file order, as a controller publishes them: numbered on without
+/// Returns the samples of all runs, in file order, as a controller publishes them: numbered on without
 /// a gap, each run under a number of its own.
 pub fn published_samples(dataset: &Dataset, train: TrainId) -> Vec<TrainSample> {
     samples_of_runs(&dataset.runs, train)
 }
 
-/// The samples of some runs, as a controller publishes them that drove no others.
+/// Returns the samples of some runs, as a controller publishes them that drove no others.
 pub fn samples_of_runs<'a>(
     runs: impl IntoIterator<Item = &'a Run>,
     train: TrainId,
@@ -125,7 +125,7 @@ fn process(
     Ok(*pipeline.snapshot())
 }
 
-/// Every kind of estimator that learns something, with its default settings.
+/// Returns every kind of estimator that learns something, with its default settings.
 pub fn default_estimators() -> Vec<EstimatorSettings> {
     PipelineKind::ALL
         .iter()
@@ -134,7 +134,7 @@ pub fn default_estimators() -> Vec<EstimatorSettings> {
         .collect()
 }
 
-/// The recommended estimators: the best measured one for each quantity that the train's file and the
+/// Returns the recommended estimators: the best measured one for each quantity that the train's file and the
 /// recordings permit, and the monitor of the model.
 pub fn recommended_estimators(dataset: &Dataset) -> Vec<EstimatorSettings> {
     let best = Quantity::ALL.iter().filter(|&&quantity| is_permitted(quantity, dataset));

@@ -10,11 +10,11 @@
 //! - [`dataset`]: recorded runs, from texts to the samples that a controller would publish; a library of its own
 //! - [`identify`]: the daemon's pipelines over recorded runs
 //! - [`survey`]: a line and its gradient from recordings with GNSS
-//! - [`stops`]: what recorded stops say of a brake of unknown force
+//! - [`stops`]: a brake of unknown force, from recorded stops
 //! - [`brakes`]: the same brake as train protection asks for it
-//! - [`explain`]: which undeclared effect explains what the declared model leaves
+//! - [`explain`]: the undeclared effect that explains the residual of the declared model
 //! - [`driven`]: the train itself, force in and speed out, by the law that `explain` predicts with
-//! - [`advice`]: what to drive next, so that the estimates become sharper
+//! - [`advice`]: the next manoeuvre, by which the estimates become sharper
 //! - [`statistics`]: the middle of values, their root mean square, their span, lists in order
 //! - [`parallel`]: work on all threads
 

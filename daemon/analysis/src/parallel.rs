@@ -1,5 +1,5 @@
-//! Work on all threads that the caller gives: what is made of each item, in the order of the items, the same on any
-//! number of threads (decision 0018).
+//! Work on all threads that the caller gives: results in the order of the items, the same on any number of threads
+//! (decision 0018).
 //!
 //! The library that shares work is compiled once here, for a call through a pointer, not anew for each place of use.
 

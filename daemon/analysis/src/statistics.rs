@@ -1,7 +1,6 @@
-//! The middle of values and what lies below others, their root mean square and their span; lists in the order of a
-//! number.
+//! Medians, quantiles, root mean squares and spans of values; lists sorted by a number.
 
-/// The middle of some values, the upper one of two; `None` of none.
+/// Returns the middle of some values, the upper one of two; `None` of none.
 pub fn middle(values: &mut [f64]) -> Option<f64> {
     let index = values.len() / 2;
     match values {
@@ -10,14 +9,14 @@ pub fn middle(values: &mut [f64]) -> Option<f64> {
     }
 }
 
-/// The middle of some values, the mean of two; `None` of none.
+/// Returns the middle of some values, the mean of two; `None` of none.
 pub fn median(values: &mut [f64]) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
     let last = values.len().checked_sub(1)?;
     Some(0.5 * (values[last / 2] + values[values.len() / 2]))
 }
 
-/// The value below which a share of some values lies; 0 of none.
+/// Returns the value below which a share of some values lies; 0 of none.
 pub fn share_of(values: &[f64], share: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
@@ -25,13 +24,13 @@ pub fn share_of(values: &[f64], share: f64) -> f64 {
     sorted.get(index).copied().unwrap_or(0.0)
 }
 
-/// Root mean square; 0 of none.
+/// Returns the root mean square; 0 of none.
 pub fn rms(values: &[f64]) -> f64 {
     let squares: f64 = values.iter().map(|value| value * value).sum();
     (squares / values.len().max(1) as f64).sqrt()
 }
 
-/// Least and greatest of some values; `None` of none.
+/// Returns the least and greatest of some values; `None` of none.
 pub fn span(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
     let ends = values.map(|value| [value; 2]);
     ends.reduce(|[low, high], [value, _]| [low.min(value), high.max(value)])
@@ -49,7 +48,7 @@ pub fn least_first<T>(list: &mut Vec<T>, number: impl Fn(&T) -> f64) {
     list.extend(order.into_iter().filter_map(|index| items[index].take()));
 }
 
-/// The places of numbers from the least to the greatest.
+/// Returns the places of numbers from the least to the greatest.
 fn order(numbers: &[f64]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..numbers.len()).collect();
     order.sort_by(|&one, &other| numbers[one].total_cmp(&numbers[other]));

@@ -12,7 +12,7 @@
 //! - [`filter`]: recursive estimators of fixed size, without knowledge of trains
 //! - [`pipeline`]: estimators behind one interface, from sample to snapshot
 //! - [`trial`]: which of several models predicts better, judged while a train runs
-//! - [`remedy`]: what a person does about a reason or a refused sample
+//! - [`remedy`]: remedies for a reason or a refused sample
 
 pub mod filter;
 pub mod pipeline;

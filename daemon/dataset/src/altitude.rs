@@ -25,8 +25,9 @@ pub(super) struct Recorded<'t> {
     pub length_m: f64,
 }
 
-/// Gradient in ‰ under a train at every row, climbing positive as the chainage grows, `NaN` where unknown: the mean
-/// over its length of the slope of the straight line fitted by least squares to the altitudes around each place.
+/// Returns the gradient in ‰ under a train at every row, climbing positive as the chainage grows, `NaN` where unknown:
+/// the mean over its length of the slope of the straight line fitted by least squares to the altitudes around each
+/// place.
 ///
 /// Positions and altitudes are `NaN` where missing.
 pub(super) fn gradient_permille(of: &Recorded) -> Vec<f64> {
@@ -47,7 +48,7 @@ pub(super) fn gradient_permille(of: &Recorded) -> Vec<f64> {
     rows.map(|&centre_m| 1000.0 * under(centre_m).unwrap_or(f64::NAN)).collect()
 }
 
-/// The cell nearest to a place, when it lies within the window.
+/// Returns the cell nearest to a place, when it lies within the window.
 fn nearest(cells: &[Cell], position_m: f64) -> Option<usize> {
     let after = cells.partition_point(|cell| cell.position_m < position_m);
     let distance_m = |cell: &usize| (cells[*cell].position_m - position_m).abs();
@@ -134,7 +135,7 @@ fn cell_number(position_m: f64) -> i64 {
     (position_m / CELL_M).floor() as i64
 }
 
-/// The cells that hold altitudes, by chainage.
+/// Returns the cells that hold altitudes, by chainage.
 fn cells(position_m: &[f64], altitude_m: &[f64]) -> Vec<Cell> {
     let mut points: Vec<(f64, f64)> = position_m
         .iter()
@@ -156,7 +157,7 @@ fn cells(position_m: &[f64], altitude_m: &[f64]) -> Vec<Cell> {
         .collect()
 }
 
-/// The line at every cell, fitted over the window around it.
+/// Returns the line at every cell, fitted over the window around it.
 fn fits(cells: &[Cell], half_window_m: f64) -> Vec<SlopeFit> {
     let (mut from, mut to) = (0, 0);
     cells

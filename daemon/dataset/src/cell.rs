@@ -1,4 +1,4 @@
-//! A cell of a run's file: its number, or what is wrong with it.
+//! A cell of a run's file: its number, or its fault.
 
 use std::borrow::Cow;
 
@@ -18,8 +18,8 @@ const MISSING: &str = "n/a na n.a. n/d nd n.d. n.v. k.a. #n/a #na #n/v #nv #n/d 
                        * missing bad bad_input i/o_timeout error err fault fehler invalid inv ungültig no_data nodata \
                        undefined undef unknown unavailable overflow underflow void empty leer";
 
-/// The number in a trimmed cell, `NaN` for an empty one and a word for what is missing; `None` when it is something
-/// else.
+/// Returns the number in a trimmed cell, `NaN` for an empty one and a word for what is missing; `None` when it is
+/// something else.
 pub fn parse_cell(cell: &[u8], marks: Marks) -> Option<f64> {
     if cell.is_empty() {
         return Some(f64::NAN);
@@ -33,7 +33,8 @@ pub fn parse_cell(cell: &[u8], marks: Marks) -> Option<f64> {
     number.or_else(|| is_missing(text).then_some(f64::NAN)).or_else(otherwise)
 }
 
-/// A number that is written otherwise: with a typographic minus, Fortran's exponent, or as a spreadsheet's text.
+/// Returns a number that is written otherwise: with a typographic minus, Fortran's exponent, or as a spreadsheet's
+/// text.
 fn plain(text: &str) -> Option<String> {
     let own = text.strip_prefix("=\"").and_then(|it| it.strip_suffix('"')).unwrap_or(text);
     let is_number = own.starts_with(['+', '-', '.', MINUS]) || own.starts_with(char::is_numeric);
@@ -48,7 +49,7 @@ fn decimal(text: &str, mark: u8) -> Option<f64> {
     text.parse().ok()
 }
 
-/// A number without the marks between its groups of three digits; `None` where they stand elsewhere.
+/// Returns a number without the marks between its groups of three digits; `None` where they stand elsewhere.
 pub fn ungrouped(text: &str, mark: char, decimal: char) -> Option<String> {
     let (whole, fraction) = text.split_once(decimal).map_or((text, None), |(a, b)| (a, Some(b)));
     let is_digits = |it: &str| it.bytes().all(|byte| byte.is_ascii_digit());
@@ -61,7 +62,7 @@ pub fn ungrouped(text: &str, mark: char, decimal: char) -> Option<String> {
     is_grouped.then(|| whole.replace(mark, "") + &rest)
 }
 
-/// True for a word, or marks, that say that a number is missing.
+/// Returns true for a word, or marks, that say that a number is missing.
 pub fn is_missing(text: &str) -> bool {
     let folded = text.to_lowercase().replace(' ', "_");
     let is_mark = |letter: char| "-_.*?/#".contains(letter);
@@ -83,7 +84,7 @@ pub fn truth(cell: &[u8]) -> Option<f64> {
     }
 }
 
-/// True for a cell that begins as no number does: a word.
+/// Returns true for a cell that begins as no number does: a word.
 pub fn is_word(cell: &[u8]) -> bool {
     let cell = cell.strip_prefix(b"=\"").unwrap_or(cell);
     let cell = cell.strip_prefix(MINUS.encode_utf8(&mut [0; 3]).as_bytes()).unwrap_or(cell);
@@ -94,7 +95,7 @@ pub fn is_word(cell: &[u8]) -> bool {
 /// Largest number in SI units that a railway has; the square or sum of a greater one might be infinite.
 const MAGNITUDE_MAX: f64 = 1e15;
 
-/// A cell's number as it is kept: in the quantity's unit, `to` which it is converted where it is in another
+/// Returns a cell's number as it is kept: in the quantity's unit, `to` which it is converted where it is in another
 /// ([`ColumnMapping::converted_to`]); missing when infinite or as good as that.
 pub fn held(mapping: &ColumnMapping, to: Option<&Unit>, cell: f64) -> f64 {
     if mapping.quantity == Quantity::CurveRadius && cell.is_infinite() {
@@ -146,7 +147,7 @@ pub fn not_a_value(
     }
 }
 
-/// The mark that would make a number of a cell, were it between groups of three digits.
+/// Returns the mark that would make a number of a cell, were it between groups of three digits.
 fn grouping(cell: &[u8], layout: &TextLayout) -> Option<String> {
     let with = |thousands| Marks { thousands: Some(thousands), ..layout.marks() };
     let mark = THOUSANDS.into_iter().filter(|mark| *mark != char::from(layout.decimal));

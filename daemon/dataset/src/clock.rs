@@ -78,7 +78,7 @@ impl TimeFormat {
         is_sound.then(|| TimeFormat::Pattern(name.into()))
     }
 
-    /// Its name or pattern.
+    /// Returns its name or pattern.
     pub fn name(&self) -> &str {
         match self {
             TimeFormat::Iso => "iso",
@@ -88,7 +88,7 @@ impl TimeFormat {
         }
     }
 
-    /// True where it holds the day, too.
+    /// Returns whether it holds the day, too.
     pub fn has_date(&self) -> bool {
         match self {
             TimeFormat::Iso => true,
@@ -107,7 +107,7 @@ impl TimeFormat {
         }
     }
 
-    /// The formats in which a cell is a time, the likeliest first.
+    /// Returns the formats in which a cell is a time, the likeliest first.
     pub(super) fn of_cell(cell: &[u8]) -> Vec<TimeFormat> {
         let patterns = PATTERNS.into_iter().map(|pattern| TimeFormat::Pattern(pattern.into()));
         let all = [TimeFormat::Iso, TimeFormat::Clock, TimeFormat::Elapsed];
@@ -145,7 +145,7 @@ const SECOND: &[char] = &['S'];
 /// The end of a pattern that says which half of the day it is.
 const HALF: &str = "%p";
 
-/// A pattern without its half of the day, before which a fraction may stand.
+/// Returns a pattern without its half of the day, before which a fraction may stand.
 fn without_half(pattern: &str) -> &str {
     pattern.strip_suffix(HALF).map_or(pattern, str::trim_end)
 }
@@ -179,17 +179,17 @@ impl DayClock {
         DayClock { format: format.clone(), items, first_day: None, last_s: None }
     }
 
-    /// The format that it reads.
+    /// Returns the format that it reads.
     pub fn format(&self) -> &TimeFormat {
         &self.format
     }
 
-    /// The day of the first row, counted from 1970-01-01; `None` where the times hold no date.
+    /// Returns the day of the first row, counted from 1970-01-01; `None` where the times hold no date.
     pub fn first_day(&self) -> Option<i64> {
         self.first_day
     }
 
-    /// A cell's time in s since the midnight before the first row; `None` for what is no such time.
+    /// Returns a cell's time in s since the midnight before the first row; `None` for what is no such time.
     pub fn seconds(&mut self, cell: &[u8]) -> Option<f64> {
         let (day, of_day_s) = self.read(cell)?;
         let time_s = match day {
@@ -214,7 +214,7 @@ impl DayClock {
         Some(time_s)
     }
 
-    /// The day, where the cell holds it, and the second of it, in UTC.
+    /// Returns the day, where the cell holds it, and the second of it, in UTC.
     fn read(&self, cell: &[u8]) -> Option<(Option<i64>, f64)> {
         if self.format == TimeFormat::Elapsed {
             return Some((None, elapsed_s(cell)?));
@@ -259,7 +259,7 @@ impl DayClock {
     }
 }
 
-/// The day of a cell that holds a date and no time, counted from 1970-01-01.
+/// Returns the day of a cell that holds a date and no time, counted from 1970-01-01.
 pub(super) fn day_of_cell(cell: &[u8]) -> Option<i64> {
     ["%Y-%m-%d", "%d.%m.%Y", "%-d.%-m.%Y", "%d/%m/%Y"].iter().find_map(|pattern| {
         let mut parsed = Parsed::new();
@@ -277,7 +277,7 @@ fn with_century(mut parsed: Parsed) -> Parsed {
     parsed
 }
 
-/// Seconds of a time since a start: days in words, hours of any number, minutes and seconds.
+/// Returns the seconds of a time since a start: days in words, hours of any number, minutes and seconds.
 fn elapsed_s(cell: &[u8]) -> Option<f64> {
     let text = std::str::from_utf8(cell).ok()?;
     let (sign, text) = text.strip_prefix('-').map_or((1.0, text), |rest| (-1.0, rest));
@@ -294,7 +294,7 @@ fn elapsed_s(cell: &[u8]) -> Option<f64> {
     is_clock.then_some(sign * days * DAY_S + sign * (hours * 3600.0 + minutes * 60.0 + seconds))
 }
 
-/// A cell without its half of the day, and whether that is the second one.
+/// Returns a cell without its half of the day, and whether that is the second one.
 fn split_half(cell: &[u8]) -> Option<(&[u8], bool)> {
     let folded: Vec<u8> = cell.to_ascii_lowercase();
     let halves: [(&[u8], bool); 4] =
@@ -312,8 +312,8 @@ fn with_zeros(cell: &[u8]) -> Option<Vec<u8>> {
     Some([&b"000000"[..zeros], cell].concat())
 }
 
-/// A fraction of a second behind a point, a comma, a stroke, or a colon before thousandths, or as further digits; 0 without; and
-/// what follows.
+/// Returns a fraction of a second behind a point, a comma, a stroke, or a colon before thousandths, or as further
+/// digits; 0 without; and what follows.
 fn fraction(text: &[u8]) -> Option<(f64, &[u8])> {
     let thousandths = text.strip_prefix(b":").filter(|it| it.len() >= 3);
     let more = Some(text).filter(|it| it.first().is_some_and(u8::is_ascii_digit));
@@ -327,7 +327,8 @@ fn fraction(text: &[u8]) -> Option<(f64, &[u8])> {
     Some((value / 10_f64.powi(count as i32), rest))
 }
 
-/// A zone's offset in s: none, `Z`, `UTC`, or as `+01:00`, `+0100`, with or without a space before or a name behind.
+/// Returns a zone's offset in s: none, `Z`, `UTC`, or as `+01:00`, `+0100`, with or without a space before or a name
+/// behind.
 fn zone_s(text: &[u8]) -> Option<f64> {
     // Its name may stand behind it in brackets.
     let text = match text.iter().position(|it| *it == b'[') {
@@ -355,7 +356,7 @@ fn zone_s(text: &[u8]) -> Option<f64> {
     Some(sign * (number(&digits[..2])? * 3600.0 + minutes * 60.0))
 }
 
-/// The second since 1970 at which a TOML date or time begins; `None` for a mere time of day, or a day
+/// Returns the second since 1970 at which a TOML date or time begins; `None` for a mere time of day, or a day
 /// that no calendar has.
 pub(super) fn unix_s(at: &toml::value::Datetime) -> Option<i64> {
     let date = at.date?;

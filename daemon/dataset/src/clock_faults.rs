@@ -115,7 +115,7 @@ fn spread(times_s: &mut [f64], step_s: f64, is_repeated: impl Fn(usize) -> bool)
     Some(usual)
 }
 
-/// The rows in the order of time, where parts that do not overlap, or single rows, stand in another.
+/// Returns the rows in the order of time, where parts that do not overlap, or single rows, stand in another.
 fn sorted(times_s: &[f64], speed_mps: &[f64], faults: &mut ClockFaults) -> Option<Vec<usize>> {
     let falls: Vec<usize> =
         (1..times_s.len()).filter(|&row| times_s[row] < times_s[row - 1]).collect();
@@ -147,7 +147,7 @@ fn sorted(times_s: &[f64], speed_mps: &[f64], faults: &mut ClockFaults) -> Optio
     Some(order)
 }
 
-/// How far the speed goes up and down from row to row, in m/s.
+/// Returns how far the speed goes up and down from row to row, in m/s.
 fn roughness(speed_mps: impl Iterator<Item = f64>) -> f64 {
     let mut before = None;
     let steps =

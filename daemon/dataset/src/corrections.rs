@@ -1,4 +1,4 @@
-//! `[corrections]` and `[[extra]]` of a `train.toml`: what measured runs add to the declared model.
+//! `[corrections]` and `[[extra]]` of a `train.toml`: additions of measured runs to the declared model.
 
 use dynocar_model::terms::extra::{Covariate, CovariateFactor, ExtraResistance, FACTORS_MAX, Form};
 

@@ -178,7 +178,7 @@ impl Serialize for Diagnostic {
     }
 }
 
-/// The quantities that an input fault is about, and the unit to report it in where none of them is mapped.
+/// Returns the quantities that an input fault is about, and the unit to report it in where none of them is mapped.
 pub(super) fn concerned(fault: InputFault) -> (&'static [Quantity], &'static str) {
     use Quantity::*;
     match fault {
@@ -195,7 +195,7 @@ pub(super) fn concerned(fault: InputFault) -> (&'static [Quantity], &'static str
     }
 }
 
-/// The unit in which the manifest reads the quantity of a fault.
+/// Returns the unit in which the manifest reads the quantity of a fault.
 pub(super) fn read_as(manifest: &Manifest, fault: InputFault) -> Unit {
     let (quantities, otherwise) = concerned(fault);
     let mapped = quantities.iter().find_map(|&quantity| manifest.mapping(quantity));

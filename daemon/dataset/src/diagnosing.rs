@@ -1,4 +1,4 @@
-//! Looks for what may be diagnosed in a run.
+//! Finds the diagnostics of a run.
 
 use dynocar_core::plausibility::Severity::{Fundamental, Info, Warning};
 use dynocar_core::plausibility::{DetectedFault, DetectedFaults, InputFault};
@@ -210,8 +210,8 @@ fn of_content(
     }
 }
 
-/// The longest interval of a moving train in which no column but the time changes, where it is an exception: coarse
-/// speeds keep their value through every cruise. A recorder that pauses with a train has not hung.
+/// Returns the longest interval of a moving train in which no column but the time changes, where it is an exception:
+/// coarse speeds keep their value through every cruise. A recorder that pauses with a train has not hung.
 fn stands_still(run: &Resolved) -> Option<Diagnostic> {
     let columns: Vec<&[f64]> = run
         .table
@@ -326,7 +326,7 @@ fn of_position(
     }
 }
 
-/// The leap in m from a position that a receiver held before its first fix; 0 without one.
+/// Returns the leap in m from a position that a receiver held before its first fix; 0 without one.
 fn leap_m(positions: impl Iterator<Item = f64>) -> f64 {
     let positions: Vec<f64> = positions.collect();
     let held = positions.iter().take_while(|it| **it == positions[0]).count();

@@ -10,7 +10,7 @@ use super::error::unknown;
 use super::error::{DatasetError, SourcePosition};
 use super::node::{Node, NodeContent};
 
-/// The names of the tables and keys at the top of a TOML file, in the order of the file.
+/// Returns the names of the tables and keys at the top of a TOML file, in the order of the file.
 ///
 /// # Errors
 ///
@@ -39,7 +39,7 @@ pub type Entries<'t, const N: usize> = Vec<([f64; N], Item<'t>)>;
 
 /// A value that is not as expected gives an error with file, line, the path to the value and the expectation.
 impl<'t> Item<'t> {
-    /// A file as a whole.
+    /// Returns a file as a whole.
     pub fn root(label: &'t str, node: &'t Node) -> Self {
         Item { label, path: String::new(), node }
     }
@@ -49,7 +49,7 @@ impl<'t> Item<'t> {
         SourcePosition { file: self.label.into(), line: self.node.line }
     }
 
-    /// A problem with this value.
+    /// Returns a problem with this value.
     pub fn wrong(&self, words: impl std::fmt::Display) -> DatasetError {
         self.place().problem(words)
     }
@@ -64,29 +64,29 @@ impl<'t> Item<'t> {
         self.wrong(unknown(what, name, &format!(" in {}", self.path), names))
     }
 
-    /// The error of a value outside its range.
+    /// Returns the error of a value outside its range.
     pub fn out_of_range(&self, value: &str, allowed: &str) -> DatasetError {
         self.wrong(format!("{} = {value}: expected {allowed}", self.name()))
     }
 
-    /// The error of a value outside its range under a key of this map, be it there or not.
+    /// Returns the error of a value outside its range under a key of this map, be it there or not.
     pub fn key_out_of_range(&self, key: &str, value: &str, allowed: &str) -> DatasetError {
         self.place_of(key).problem(format!("{} = {value}: expected {allowed}", self.full(key)))
     }
 
-    /// The error of a value of another kind than is expected.
+    /// Returns the error of a value of another kind than is expected.
     pub fn wrong_type(&self, expected: &str) -> DatasetError {
         self.wrong(format!("{}: expected {expected}, got {}", self.name(), self.node.shown()))
     }
 
-    /// The error of two keys of this map that exclude each other.
+    /// Returns the error of two keys of this map that exclude each other.
     pub fn exclusive(&self, key: &str, other: &str) -> DatasetError {
         let (full, other) = (self.full(key), self.full(other));
         let words = format!("{full} and {other} exclude each other: give one of them");
         self.place_of(key).problem(words)
     }
 
-    /// A path to a key of this map.
+    /// Returns a path to a key of this map.
     pub fn full(&self, key: &str) -> String {
         if self.path.is_empty() { key.into() } else { format!("{}.{key}", self.path) }
     }
@@ -102,7 +102,7 @@ impl<'t> Item<'t> {
         }
     }
 
-    /// The names of this map in the order of the file; none of another value.
+    /// Returns the names of this map in the order of the file; none of another value.
     pub fn keys(&self) -> impl Iterator<Item = &'t str> + use<'t> {
         self.entries_of_map().iter().map(|(name, _)| name.as_str())
     }
@@ -114,7 +114,7 @@ impl<'t> Item<'t> {
         Err(self.place_of(name).problem(unknown("key", name, &context, keys.iter().copied())))
     }
 
-    /// True for a key of this map whose value nobody has asked for.
+    /// Returns true for a key of this map whose value nobody has asked for.
     pub fn is_unread(&self, key: &str) -> bool {
         self.find(key).is_some_and(|item| !item.node.is_read.get())
     }
@@ -124,24 +124,24 @@ impl<'t> Item<'t> {
         Some(Item { label: self.label, path: self.full(key), node })
     }
 
-    /// Where a key of this map stands; this map where it has none.
+    /// Returns where a key of this map stands; this map where it has none.
     pub fn place_of(&self, key: &str) -> SourcePosition {
         self.find(key).map_or_else(|| self.place(), |item| item.place())
     }
 
-    /// True where a key of this map has a value, which is not counted as read.
+    /// Returns whether a key of this map has a value, which is not counted as read.
     pub fn has(&self, key: &str) -> bool {
         self.find(key).is_some_and(|item| !item.node.is_null())
     }
 
-    /// The value under a key of this map, unless it is null.
+    /// Returns the value under a key of this map, unless it is null.
     pub fn get(&self, key: &str) -> Option<Item<'t>> {
         let item = self.find(key)?;
         item.node.is_read.set(true);
         (!item.node.is_null()).then_some(item)
     }
 
-    /// The value under a key that must be there.
+    /// Returns the value under a key that must be there.
     pub fn need(&self, key: &str, expected: &str) -> Result<Item<'t>, DatasetError> {
         if !self.is_map() {
             return Err(self.wrong_type(&format!("keys and values, among them {key}")));
@@ -150,7 +150,7 @@ impl<'t> Item<'t> {
         self.get(key).ok_or_else(|| self.wrong(missing()))
     }
 
-    /// The table under a key.
+    /// Returns the table under a key.
     pub fn table(&self, key: &str) -> Result<Option<Item<'t>>, DatasetError> {
         match self.get(key) {
             Some(other) if !other.is_map() => Err(other.wrong_type("a table")),
@@ -158,13 +158,13 @@ impl<'t> Item<'t> {
         }
     }
 
-    /// The table under a key that must be there.
+    /// Returns the table under a key that must be there.
     pub fn need_table(&self, key: &str) -> Result<Item<'t>, DatasetError> {
         self.need(key, "a table")?;
         Ok(self.table(key)?.expect("a table that is needed"))
     }
 
-    /// The tables of an array of tables, none where the key is not there.
+    /// Returns the tables of an array of tables, none where the key is not there.
     pub fn tables(&self, key: &str) -> Result<Vec<Item<'t>>, DatasetError> {
         let Some(list) = self.get(key) else { return Ok(Vec::new()) };
         let tables = list.list("a list of tables", 0)?;
@@ -174,7 +174,7 @@ impl<'t> Item<'t> {
         }
     }
 
-    /// The items of this list, `least` or more.
+    /// Returns the items of this list, `least` or more.
     pub fn list(&self, expected: &str, least: usize) -> Result<Vec<Item<'t>>, DatasetError> {
         let NodeContent::List(nodes) = &self.node.content else {
             return Err(self.wrong_type(expected));
@@ -188,24 +188,24 @@ impl<'t> Item<'t> {
         Ok(items.map(|(index, node)| Item { path: path(index), node, ..*self }).collect())
     }
 
-    /// The N items of this list.
+    /// Returns the N items of this list.
     pub fn tuple<const N: usize>(&self, form: &str) -> Result<[Item<'t>; N], DatasetError> {
         let items = self.list(form, 0)?;
         let found = format!("a list of {}", items.len());
         items.try_into().map_err(|_| self.out_of_range(&found, form))
     }
 
-    /// True for a list.
+    /// Returns true for a list.
     pub fn is_list(&self) -> bool {
         matches!(self.node.content, NodeContent::List(_))
     }
 
-    /// True for a map.
+    /// Returns true for a map.
     pub fn is_map(&self) -> bool {
         matches!(self.node.content, NodeContent::Map(_))
     }
 
-    /// This text, or number as it is written.
+    /// Returns this text, or number as it is written.
     pub fn text(&self, expected: &str) -> Result<&'t str, DatasetError> {
         match &self.node.content {
             NodeContent::Text(text) | NodeContent::Plain(text)
@@ -217,18 +217,18 @@ impl<'t> Item<'t> {
         }
     }
 
-    /// The text, or number as it is written, under a key that must be there.
+    /// Returns the text, or number as it is written, under a key that must be there.
     pub fn need_text(&self, key: &str, expected: &str) -> Result<&'t str, DatasetError> {
         self.need(key, expected)?.text(expected)
     }
 
-    /// The text in quotes under a key.
+    /// Returns the text in quotes under a key.
     pub fn quoted(&self, key: &str) -> Result<Option<&'t str>, DatasetError> {
         let Some(item) = self.get(key) else { return Ok(None) };
         item.as_quoted().map(Some).ok_or_else(|| item.wrong_type("a text in quotes"))
     }
 
-    /// This text, where it stands in quotes.
+    /// Returns this text, where it stands in quotes.
     pub fn as_quoted(&self) -> Option<&'t str> {
         match &self.node.content {
             NodeContent::Text(text) => Some(text),
@@ -236,7 +236,7 @@ impl<'t> Item<'t> {
         }
     }
 
-    /// The text in quotes under a key that must be there and not be empty.
+    /// Returns the text in quotes under a key that must be there and not be empty.
     pub fn need_quoted(&self, key: &str, expected: &str) -> Result<&'t str, DatasetError> {
         let item = self.need(key, expected)?;
         match self.quoted(key)?.unwrap_or_default() {
@@ -257,7 +257,7 @@ impl<'t> Item<'t> {
         find(word).ok_or_else(|| item.unknown(what, word, names))
     }
 
-    /// The same, when the key is there.
+    /// Returns the same, when the key is there.
     pub fn named_under<T, N: Into<String>>(
         &self,
         key: &str,
@@ -268,7 +268,7 @@ impl<'t> Item<'t> {
         self.has(key).then(|| self.need_named(key, words, find, names)).transpose()
     }
 
-    /// The truth under a key.
+    /// Returns the truth under a key.
     pub fn truth(&self, key: &str) -> Result<Option<bool>, DatasetError> {
         let Some(item) = self.get(key) else { return Ok(None) };
         match &item.node.content {
@@ -279,7 +279,7 @@ impl<'t> Item<'t> {
         }
     }
 
-    /// The date or time under a key, as TOML writes it, in quotes or without.
+    /// Returns the date or time under a key, as TOML writes it, in quotes or without.
     pub fn datetime(&self, key: &str) -> Result<Option<Datetime>, DatasetError> {
         let Some(item) = self.get(key) else { return Ok(None) };
         let datetime = match &item.node.content {
@@ -289,7 +289,7 @@ impl<'t> Item<'t> {
         datetime.map(Some).ok_or_else(|| item.wrong_type("a date, as 2026-03-18"))
     }
 
-    /// This number, when it satisfies `is_allowed`; `allowed` says so in words.
+    /// Returns this number, when it satisfies `is_allowed`; `allowed` says so in words.
     pub fn checked(
         &self,
         allowed: &str,
@@ -302,18 +302,18 @@ impl<'t> Item<'t> {
         Ok(number)
     }
 
-    /// A number that stands here, when its rule allows it.
+    /// Returns a number that stands here, when its rule allows it.
     pub fn within(&self, number: f64, rule: &NumberRule) -> Result<f64, DatasetError> {
         let refused = || self.out_of_range(&number.to_string(), rule.allowed);
         Some(number).filter(|it| it.is_finite() && rule.allows(*it)).ok_or_else(refused)
     }
 
-    /// This number, within a range.
+    /// Returns this number, within a range.
     pub fn number(&self, allowed: &str, range: impl RangeBounds<f64>) -> Result<f64, DatasetError> {
         self.checked(allowed, |number| range.contains(&number))
     }
 
-    /// This number of a unit, in the base unit, within a range in that.
+    /// Returns this number of a unit, in the base unit, within a range in that.
     pub fn in_unit(
         &self,
         unit: &Unit,
@@ -324,7 +324,7 @@ impl<'t> Item<'t> {
         Ok(unit.to_base(number))
     }
 
-    /// The number under a key, when there is one and it satisfies `is_allowed`.
+    /// Returns the number under a key, when there is one and it satisfies `is_allowed`.
     pub fn checked_under(
         &self,
         key: &str,
@@ -334,7 +334,7 @@ impl<'t> Item<'t> {
         self.get(key).map(|item| item.checked(allowed, is_allowed)).transpose()
     }
 
-    /// The number under a key, when there is one.
+    /// Returns the number under a key, when there is one.
     pub fn optional(
         &self,
         key: &str,
@@ -344,7 +344,7 @@ impl<'t> Item<'t> {
         self.get(key).map(|item| item.number(allowed, range)).transpose()
     }
 
-    /// The number under a key that must be there.
+    /// Returns the number under a key that must be there.
     pub fn required(
         &self,
         key: &str,
@@ -354,7 +354,7 @@ impl<'t> Item<'t> {
         self.need(key, allowed)?.number(allowed, range)
     }
 
-    /// The entries of the list under a key, each as `read` takes it; `form` shows one.
+    /// Returns the entries of the list under a key, each as `read` takes it; `form` shows one.
     pub fn entries_as<T>(
         &self,
         key: &str,
@@ -372,7 +372,7 @@ impl<'t> Item<'t> {
         items.into_iter().enumerate().map(entry).collect::<Result<_, _>>().map(Some)
     }
 
-    /// The list of N-tuples of finite numbers under a key; `form` shows one entry.
+    /// Returns the list of N-tuples of finite numbers under a key; `form` shows one entry.
     pub fn entries<const N: usize>(
         &self,
         key: &str,

@@ -14,17 +14,17 @@ pub struct SourcePosition {
 }
 
 impl SourcePosition {
-    /// A line, from 1, of a file.
+    /// Returns a line, from 1, of a file.
     pub fn line(file: &str, line: usize) -> Self {
         SourcePosition { file: file.into(), line: Some(line) }
     }
 
-    /// A file as a whole.
+    /// Returns a file as a whole.
     pub fn whole(file: &str) -> Self {
         SourcePosition { file: file.into(), line: None }
     }
 
-    /// A problem at this place: what was expected, and what came.
+    /// Returns a problem at this place: what was expected, and what came.
     pub fn problem(self, words: impl Display) -> DatasetError {
         DatasetError { place: self, words: words.to_string() }
     }
@@ -106,7 +106,7 @@ pub enum FileProblem {
 }
 
 impl FileProblem {
-    /// The error of a file that was named itself and cannot be read.
+    /// Returns the error of a file that was named itself and cannot be read.
     pub fn of(self, label: &str) -> DatasetError {
         let line = match self {
             FileProblem::NotUtf8 { line } | FileProblem::OtherEncoding { line, .. } => Some(line),
@@ -130,7 +130,7 @@ pub fn unknown<T: Into<String>>(
     format!("unknown {what} '{name}'{context}{meant} (choices: {choices})")
 }
 
-/// The name that is likely meant by a word: at most a third of the letters differ, or else it is
+/// Returns the name that is likely meant by a word: at most a third of the letters differ, or else it is
 /// the only name that the word begins.
 pub fn nearest<'n>(word: &str, all: &'n [String]) -> Option<&'n str> {
     let word = folded(word);

@@ -135,7 +135,7 @@ impl Force {
         Force { force_n, source, is_spike, zeroed: 0, negative: 0, handle_out_of_range: 0 }
     }
 
-    /// The declared greatest force in N, else the recorded one.
+    /// Returns the declared greatest force in N, else the recorded one.
     fn greatest_n(&self, curve: Option<&EffortCurve>) -> f64 {
         if let (Some(curve), true) = (curve, self.source != ForceSource::None) {
             return curve.force_max_n();
@@ -145,7 +145,7 @@ impl Force {
     }
 }
 
-/// Both forces by their own columns or handles.
+/// Returns both forces by their own columns or handles.
 fn recorded(table: &Table, speed_mps: &[f64], train: &TrainModel) -> (Force, Force) {
     let traction = Force::read(
         table.column(Quantity::TractionForce),
@@ -182,7 +182,7 @@ fn by_power(
     }
 }
 
-/// Traction and brake from their difference.
+/// Returns the traction and brake from their difference.
 fn split(control: &[f64], source: ForceSource) -> (Force, Force) {
     let part = |sign: f64| {
         let part = |&force: &f64| if force.is_nan() { f64::NAN } else { (sign * force).max(0.0) };
@@ -226,7 +226,7 @@ fn hand_over(force_n: f64, noise_n: f64, row: usize, from: &mut Force, to: &mut 
     }
 }
 
-/// A run's power in W, row by row, `NaN` where missing, what is fed back negative: the drive's own
+/// Returns a run's power in W, row by row, `NaN` where missing, what is fed back negative: the drive's own
 /// power, else the line's.
 pub(super) fn recorded_w(table: &Table) -> Option<Cow<'_, [f64]>> {
     table.filled(Quantity::TractionPower).map(Cow::from).or_else(|| line_power_w(table))
@@ -252,7 +252,7 @@ pub fn is_stamped_late(late_s: f64, std_s: f64) -> bool {
     late_s > LATE_MIN.0 && late_s > LATE_MIN.1 * std_s
 }
 
-/// The force at a stamp by forces that are stamped `late_s` late: what stands `late_s` further on a
+/// Returns the force at a stamp by forces that are stamped `late_s` late: what stands `late_s` further on a
 /// straight line to the next sample, `step_s` ahead.
 #[inline]
 pub fn stamped_late(here: f64, ahead: f64, step_s: f64, late_s: f64) -> f64 {

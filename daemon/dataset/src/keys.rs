@@ -30,22 +30,22 @@ impl FileKey {
         assign(self.name, value)
     }
 
-    /// The key with a value to set, in words.
+    /// Returns the key with a value to set, in words.
     pub fn advice(&self, value: impl Display) -> String {
         format!("set {} in [{}]", self.assign(value), self.table)
     }
 
-    /// The value in quotes or not at all.
+    /// Returns the value in quotes or not at all.
     pub fn quoted<'t>(&self, section: &Item<'t>) -> Result<Option<&'t str>, DatasetError> {
         section.quoted(self.name)
     }
 
-    /// The value in quotes, which must be there.
+    /// Returns the value in quotes, which must be there.
     pub fn need_quoted<'t>(&self, section: &Item<'t>) -> Result<&'t str, DatasetError> {
         section.need_quoted(self.name, self.rule.allowed)
     }
 
-    /// The number, in the file's unit.
+    /// Returns the number, in the file's unit.
     ///
     /// # Errors
     ///
@@ -58,7 +58,7 @@ impl FileKey {
         section.checked_under(self.name, rule.allowed, |value| rule.allows(value))
     }
 
-    /// The item named by the word in quotes: one of these names.
+    /// Returns the item named by the word in quotes: one of these names.
     pub fn named<T, N: Into<String>>(
         &self,
         section: &Item,
@@ -69,7 +69,7 @@ impl FileKey {
         section.named_under(self.name, (noun, self.rule.allowed), find, names)
     }
 
-    /// The list of entries, each N numbers of the form that the row says.
+    /// Returns the list of entries, each N numbers of the form that the row says.
     pub fn entries<'t, const N: usize>(
         &self,
         section: &Item<'t>,
@@ -77,7 +77,7 @@ impl FileKey {
         section.entries(self.name, self.rule.allowed)
     }
 
-    /// The error of a value that is not what the row says.
+    /// Returns the error of a value that is not what the row says.
     pub fn refused(&self, section: &Item, found: impl Display) -> DatasetError {
         section.key_out_of_range(self.name, &found.to_string(), self.rule.allowed)
     }
@@ -121,7 +121,7 @@ macro_rules! keys {
         }
     )*
 
-    /// Every key of the three files.
+    /// Returns every key of the three files.
     pub fn all() -> impl Iterator<Item = FileKey> {
         let own = [$( $module::KEYS ),*].concat();
         own.into_iter().chain(NUMBERS.iter().copied().map(FileKey::from))
@@ -255,13 +255,13 @@ pub fn assign(name: &str, value: impl Display) -> String {
     format!("{name} = {value}")
 }
 
-/// A table of assignments within a line.
+/// Returns a table of assignments within a line.
 pub fn inline(assignments: impl IntoIterator<Item = String>) -> String {
     let all: Vec<String> = assignments.into_iter().collect();
     format!("{{ {} }}", all.join(", "))
 }
 
-/// The numbers of a train in a table of `train.toml`.
+/// Returns the numbers of a train in a table of `train.toml`.
 pub fn numbers_of(table: &str) -> impl Iterator<Item = &'static Key> {
     NUMBERS.iter().copied().filter(move |it| it.table == table)
 }

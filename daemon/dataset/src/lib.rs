@@ -4,7 +4,7 @@
 //! hold which quantities in which units, a `train.toml` and, where the line is known, a
 //! `track.toml`. Everything particular to the files ends here: what comes out are the very
 //! [`TrainSample`](dynocar_shared::TrainSample)s that a controller would publish, in SI units,
-//! and an account of what the data are like.
+//! and an account of the data's quality.
 //!
 //! The texts come in through [`DatasetFiles`]; this library opens no file.
 //!
@@ -13,9 +13,9 @@
 //! - [`node`], [`document`], `names`, [`error`]: keys and values with their lines; mistakes with their choices
 //! - [`keys`]: every key of the three TOML files, for readers and writers
 //! - [`manifest`], [`train_file`], [`track_file`]: the three TOML files
-//! - [`quantity`]: what a column may hold, in which [`units`](dynocar_model::units)
+//! - [`quantity`]: quantities of columns, in their [`units`](dynocar_model::units)
 //! - [`text_layout`], [`clock`]: how text falls into cells, and times that are no numbers
-//! - `run_content`: what a run's file holds, text or columns
+//! - `run_content`: contents of a run's file, text or columns
 //! - `lines`, `header`, `cell`, `table`: a CSV file as columns of numbers
 //! - [`trains`]: files that hold several trains
 //! - `clock_faults`: an hour of summer time, seconds without a fraction, rows in another order
@@ -55,6 +55,7 @@ pub mod text_layout;
 pub mod track_file;
 pub mod train_file;
 pub mod trains;
+mod unusual_resistance;
 pub mod written;
 
 #[cfg(test)]
@@ -62,7 +63,6 @@ mod tests;
 
 pub use clock::TimeFormat;
 pub use dataset_diagnostic::{DatasetDiagnostic, Diagnostic};
-pub use declared::unusual_resistance;
 pub use document::top_keys;
 pub use error::{DatasetError, FileProblem, SourcePosition};
 pub use forces::{ForceSource, is_stamped_late, stamped_late};
@@ -78,6 +78,7 @@ pub use table::LineCounts;
 pub use text_layout::TextLayout;
 pub use track_file::parse_track;
 pub use train_file::parse_train;
+pub use unusual_resistance::unusual_resistance;
 
 use std::sync::Arc;
 
@@ -92,7 +93,7 @@ pub const MANIFEST_FILE: &str = "dataset.toml";
 /// Where the texts of a dataset come from. Paths are as the dataset writes them, from its
 /// folder.
 pub trait DatasetFiles: Sync {
-    /// The text of a file.
+    /// Returns the text of a file.
     ///
     /// # Errors
     ///
@@ -108,7 +109,7 @@ pub trait DatasetFiles: Sync {
         self.read(path).map(RunContent::Text)
     }
 
-    /// The file's name in messages.
+    /// Returns the file's name in messages.
     fn label(&self, path: &str) -> String {
         path.into()
     }
@@ -149,7 +150,7 @@ pub struct Dataset {
 }
 
 impl Dataset {
-    /// The usual time in s between two samples, of the run whose samples are furthest apart.
+    /// Returns the usual time in s between two samples, of the run whose samples are furthest apart.
     pub fn step_s(&self) -> f64 {
         self.runs.iter().map(|run| run.quality.order.step_s).fold(0.0, f64::max)
     }
@@ -165,14 +166,14 @@ impl Dataset {
         }
     }
 
-    /// The same with forces that act `late_s` before their stamps taken where they act.
+    /// Returns the same with forces that act `late_s` before their stamps taken where they act.
     pub fn with_forces_moved(&self, late_s: f64) -> Dataset {
         let mut dataset = self.clone();
         dataset.runs.iter_mut().for_each(|run| run.move_forces(late_s));
         dataset
     }
 
-    /// The same with the forces that come from power taken from another drive.
+    /// Returns the same with the forces that come from power taken from another drive.
     pub fn with_drive(&self, drive: PowerTrain) -> Dataset {
         let mut dataset = self.clone();
         let before = self.train.drive.unwrap_or(PowerTrain::USUAL);
@@ -183,7 +184,7 @@ impl Dataset {
         dataset
     }
 
-    /// True where forces come from power and nobody declares how much of it reaches the rims.
+    /// Returns whether forces come from power and nobody declares how much of it reaches the rims.
     pub fn is_efficiency_unknown(&self) -> bool {
         let by_power = |run: &Run| run.traction_source == ForceSource::Power;
         self.train.drive.is_none() && self.runs.iter().any(by_power)
@@ -273,13 +274,13 @@ impl Dataset {
         DatasetHead::open(files)?.read(files)
     }
 
-    /// The runs with a role.
+    /// Returns the runs with a role.
     pub fn with_role(&self, role: Role) -> impl Iterator<Item = &Run> {
         self.runs.iter().filter(move |run| run.role == role)
     }
 }
 
-/// The text of a file; `listed_at` is where the dataset names it.
+/// Returns the text of a file; `listed_at` is where the dataset names it.
 fn text(
     files: &(impl DatasetFiles + ?Sized),
     path: &str,

@@ -27,7 +27,7 @@ pub struct CellRow<'t> {
 }
 
 impl CellRow<'_> {
-    /// The text of a cell, trimmed of spaces; empty beyond the last one.
+    /// Returns the text of a cell, trimmed of spaces; empty beyond the last one.
     pub fn trimmed(&self, index: usize) -> &[u8] {
         self.cells.get(index).map_or(b"", |cell| cell.text.trim_ascii())
     }
@@ -49,14 +49,14 @@ pub struct RowReader<'t> {
 }
 
 impl<'t> RowReader<'t> {
-    /// A reader of a text's rows with these marks between cells and within numbers.
+    /// Returns a reader of a text's rows with these marks between cells and within numbers.
     pub fn new(text: &'t str, delimiter: u8, decimal: u8) -> Self {
         let rest = text.strip_prefix('\u{feff}').unwrap_or(text).as_bytes();
         let has_plain = delimiter != decimal && !b"0123456789+-".contains(&delimiter);
         RowReader { rest, line: 1, delimiter, decimal, has_plain }
     }
 
-    /// The bytes that are not read yet.
+    /// Returns the bytes that are not read yet.
     pub fn bytes_left(&self) -> usize {
         self.rest.len()
     }
@@ -119,7 +119,7 @@ impl<'t> RowReader<'t> {
         Cell { text, plain: None }
     }
 
-    /// Where the next delimiter or end of the line stands.
+    /// Returns where the next delimiter or end of the line stands.
     #[inline]
     fn end_from(&self, from: usize) -> usize {
         let is_end = |byte: &u8| *byte == self.delimiter || matches!(byte, b'\n' | b'\r');
@@ -127,7 +127,7 @@ impl<'t> RowReader<'t> {
     }
 }
 
-/// A text without its byte-order mark and the lines above the names.
+/// Returns a text without its byte-order mark and the lines above the names.
 pub fn below<'t>(label: &str, text: &'t str, skip_rows: usize) -> Result<&'t str, DatasetError> {
     let mut rest = text.strip_prefix('\u{feff}').unwrap_or(text);
     for lines in 0..skip_rows {
@@ -152,7 +152,7 @@ const POWERS_OF_TEN: [f64; 20] = [
 /// The greatest whole number below which a double holds them all.
 const EXACT_MAX: u64 = 1 << 53;
 
-/// How many bytes of a text are a sign, digits and a decimal mark, and the number that they write; `None`
+/// Returns how many bytes of a text are a sign, digits and a decimal mark, and the number that they write; `None`
 /// where they write none, or one that takes more than a division to round as [`f64::from_str`] does.
 ///
 /// Both the digits as a whole number and the power of ten below it are exact, so that the one
@@ -207,12 +207,13 @@ fn elsewhere(text: &str, (layout, mappings): (&TextLayout, &[ColumnMapping])) ->
     })
 }
 
-/// The names in a row, without spaces around them.
+/// Returns the names in a row, without spaces around them.
 pub fn names_of(row: &CellRow) -> Vec<String> {
     row.cells.iter().map(|cell| lossy(&cell.text).trim().to_owned()).collect()
 }
 
-/// The indices of every mapping's columns among the names of a text that is laid out so; or what is wrong with the names.
+/// Returns the indices of every mapping's columns among the names of a text that is laid out so; or what is wrong with
+/// the names.
 pub fn find_columns(
     header: &[String],
     text: &str,
@@ -256,7 +257,7 @@ mod tests {
 
     use super::*;
 
-    /// The rows of a text, with their lines.
+    /// Returns the rows of a text, with their lines.
     fn rows(text: &str, delimiter: u8) -> Vec<(usize, Vec<String>)> {
         let (mut reader, mut row) = (RowReader::new(text, delimiter, b'.'), CellRow::default());
         let mut rows = Vec::new();
@@ -268,7 +269,7 @@ mod tests {
         rows
     }
 
-    /// The same by the crate `csv`, whose reader stands at the end of the line before, or before blank lines.
+    /// Returns the same by the crate `csv`, whose reader stands at the end of the line before, or before blank lines.
     fn rows_of_csv(text: &str, delimiter: u8) -> Vec<(usize, Vec<String>)> {
         let mut builder = ReaderBuilder::new();
         builder.delimiter(delimiter).has_headers(false).flexible(true);

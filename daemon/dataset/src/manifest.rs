@@ -64,7 +64,7 @@ pub struct ColumnMapping {
 }
 
 impl ColumnMapping {
-    /// A column of times in s, which takes columns of numbers, too.
+    /// Returns a column of times in s, which takes columns of numbers, too.
     pub fn of_time(column: &str) -> Self {
         ColumnMapping {
             quantity: Quantity::Time,
@@ -79,22 +79,22 @@ impl ColumnMapping {
         }
     }
 
-    /// The names of its columns.
+    /// Returns the names of its columns.
     pub fn names(&self) -> impl Iterator<Item = &String> {
         std::iter::once(&self.column).chain(&self.parts)
     }
 
-    /// Its columns for people, as `'a' + 'b'`.
+    /// Returns its columns for people, as `'a' + 'b'`.
     pub fn shown(&self) -> String {
         self.names().map(|name| format!("'{name}'")).collect::<Vec<_>>().join(" + ")
     }
 
-    /// A cell's number in [`unit`](Self::unit).
+    /// Returns a cell's number in [`unit`](Self::unit).
     pub fn scaled(&self, cell: f64) -> f64 {
         cell * self.scale + self.offset
     }
 
-    /// The quantity's unit, where the cells are in another.
+    /// Returns the quantity's unit, where the cells are in another.
     pub fn converted_to(&self) -> Option<Unit> {
         Some(self.quantity.unit()).filter(|unit| unit.name() != self.unit.name())
     }
@@ -188,13 +188,13 @@ impl Manifest {
         })
     }
 
-    /// The unit in which the runs hold the speed.
+    /// Returns the unit in which the runs hold the speed.
     pub fn speed_unit(&self) -> Unit {
         let mapped = self.mapping(Quantity::Speed);
         mapped.map_or(Quantity::Speed.unit(), |mapping| mapping.unit)
     }
 
-    /// The mapping of a quantity.
+    /// Returns the mapping of a quantity.
     pub fn mapping(&self, quantity: Quantity) -> Option<&ColumnMapping> {
         self.columns.iter().find(|mapping| mapping.quantity == quantity)
     }
@@ -265,12 +265,12 @@ fn mapping(columns: &Item, quantity: Quantity) -> Result<ColumnMapping, DatasetE
     })
 }
 
-/// An assignment of any value, for messages.
+/// Returns an assignment of any value, for messages.
 fn of_any(key: FileKey) -> String {
     key.assign("\"…\"")
 }
 
-/// The columns of a quantity: one, or several that add up.
+/// Returns the columns of a quantity: one, or several that add up.
 fn columns_of(section: &Item, quantity: Quantity) -> Result<Vec<String>, DatasetError> {
     let expected = match quantity.adds_up() {
         true => format!("{}, or a list of names of columns that add up", COLUMN.rule.allowed),
@@ -300,7 +300,7 @@ fn unit(section: &Item, quantity: Quantity) -> Result<Unit, DatasetError> {
     section.need_named(UNIT.name, ("unit", &expected), find, units)
 }
 
-/// How times are written that are no numbers.
+/// Returns how times are written that are no numbers.
 fn time_format(section: &Item) -> Result<Option<TimeFormat>, DatasetError> {
     let Some(name) = FORMAT.quoted(section)? else { return Ok(None) };
     for other in [UNIT, SCALE, OFFSET] {
@@ -337,7 +337,7 @@ fn runs(root: &Item, columns: &[ColumnMapping]) -> Result<Vec<RunEntry>, Dataset
     Ok(runs)
 }
 
-/// True for two spellings of one path, as `1.csv` and `./1.csv`.
+/// Returns true for two spellings of one path, as `1.csv` and `./1.csv`.
 fn is_same_path(one: &str, other: &str) -> bool {
     let parts = |path| Path::new(path).components().filter(|part| *part != Component::CurDir);
     parts(one).eq(parts(other))
@@ -359,7 +359,7 @@ fn run(section: &Item) -> Result<RunEntry, DatasetError> {
     })
 }
 
-/// The second at which a run's date begins.
+/// Returns the second at which a run's date begins.
 fn date(section: &Item) -> Result<Option<i64>, DatasetError> {
     let Some(date) = section.datetime(DATE.name)? else { return Ok(None) };
     let refused = || DATE.refused(section, date);

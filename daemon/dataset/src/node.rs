@@ -32,7 +32,7 @@ pub enum NodeContent {
 }
 
 impl Node {
-    /// A value that nobody has asked for yet.
+    /// Returns a value that nobody has asked for yet.
     pub fn new(line: Option<usize>, content: NodeContent) -> Self {
         Node { line, content, is_read: Cell::new(false) }
     }
@@ -61,7 +61,7 @@ impl Node {
         matches!(text.as_str(), "" | "~" | "null" | "Null" | "NULL")
     }
 
-    /// This number, be it finite or not; `None` for anything else.
+    /// Returns this number, be it finite or not; `None` for anything else.
     pub(super) fn number(&self) -> Option<f64> {
         let NodeContent::Plain(text) = &self.content else { return None };
         match text.trim_start_matches(['+', '-']) {
@@ -76,7 +76,7 @@ impl Node {
         }
     }
 
-    /// A value in few words.
+    /// Returns a value in few words.
     pub(super) fn shown(&self) -> String {
         match &self.content {
             NodeContent::Plain(_) if self.is_null() => "nothing".into(),

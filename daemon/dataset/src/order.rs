@@ -1,4 +1,4 @@
-//! The rows' order in time: what is out of order, repeated or missing.
+//! The rows' order in time: rows out of order, repeated or missing.
 
 use dynocar_core::pipeline::admission::limits::TIME_STEP;
 use serde::Serialize;
@@ -66,7 +66,7 @@ impl TimeOrder {
         TimeOrder { in_order, lost_before, counts }
     }
 
-    /// The rows in order.
+    /// Returns the rows in order.
     pub fn rows(&self) -> impl DoubleEndedIterator<Item = usize> + Clone {
         marked(&self.in_order)
     }
@@ -76,7 +76,7 @@ fn marked(marks: &[bool]) -> impl DoubleEndedIterator<Item = usize> + Clone {
     (0..marks.len()).filter(|&row| marks[row])
 }
 
-/// Each row with the one after it.
+/// Returns each row with the one after it.
 pub(super) fn pairs(mut rows: impl Iterator<Item = usize>) -> impl Iterator<Item = (usize, usize)> {
     let mut last = rows.next();
     rows.map(move |row| (last.replace(row).unwrap_or(row), row))
@@ -160,7 +160,7 @@ pub(super) fn longest_increasing(values: &[f64]) -> Vec<bool> {
     marks
 }
 
-/// The value below which a share of the values lies, 0 to 1, which change places; `None` for nothing.
+/// Returns the value below which a share of the values lies, 0 to 1, which change places; `None` for nothing.
 pub(super) fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
     let rank = (share * values.len() as f64) as usize;
     let rank = rank.min(values.len().checked_sub(1)?);

@@ -114,7 +114,7 @@ pub struct Phases {
 }
 
 impl RunQuality {
-    /// Samples that validation refuses, whatever the reason.
+    /// Returns the samples that validation refuses, whatever the reason.
     pub fn refused_in_all(&self) -> usize {
         self.refused.iter().map(|refused| refused.count).sum()
     }
@@ -163,7 +163,7 @@ fn missing(run: &Resolved) -> Vec<QuantityCount> {
     )
 }
 
-/// The mapped quantities behind the two forces.
+/// Returns the mapped quantities behind the two forces.
 fn force_quantities(run: &Resolved) -> (Quantity, Quantity) {
     let mapped = |choices: [Quantity; 2], otherwise| {
         choices.into_iter().find(|&q| run.table.column(q).is_some()).unwrap_or(otherwise)
@@ -213,7 +213,7 @@ fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     })
 }
 
-/// The integral of the speed over the rows in order, by trapezoids between good speeds.
+/// Returns the integral of the speed over the rows in order, by trapezoids between good speeds.
 fn distance_m(run: &Resolved) -> f64 {
     let is_good = |row: &usize| !run.speeds.speed_mps[*row].is_nan() && !run.speeds.is_spike[*row];
     pairs(run.order.rows().filter(is_good))
@@ -261,7 +261,7 @@ pub(super) struct Judge {
 }
 
 impl Judge {
-    /// Nothing seen yet of a run.
+    /// Returns nothing seen yet of a run.
     pub fn new(context: Context, is_position_recorded: bool) -> Self {
         let mut admission = Admission::new(DATASET_TRAIN, context.train.clone());
         admission.set_position_measured(is_position_recorded);
@@ -303,7 +303,7 @@ impl Judge {
         self.balance
     }
 
-    /// The reasons for which validation refuses samples, how many, and the row of the first.
+    /// Returns the reasons for which validation refuses samples, how many, and the row of the first.
     pub fn refused(&self) -> impl Iterator<Item = (RejectionReason, usize, usize)> {
         let counts = RejectionReason::ALL.iter().copied().zip(self.refused);
         counts

@@ -22,7 +22,7 @@ macro_rules! quantities {
                 match self { $( Quantity::$item => Dimension::$dimension ),* }
             }
 
-            /// The field of a sample that it fills.
+            /// Returns the field of a sample that it fills.
             pub fn field(self) -> Option<SampleField> {
                 match self { $( Quantity::$item => None$(.or(Some(SampleField::$field)))? ),* }
             }
@@ -92,12 +92,12 @@ quantities! {
 }
 
 impl Quantity {
-    /// The quantity that fills a field of a sample; `None` for a field that no column holds.
+    /// Returns the quantity that fills a field of a sample; `None` for a field that no column holds.
     pub fn of_field(field: SampleField) -> Option<Self> {
         Self::ALL.into_iter().find(|it| it.field() == Some(field))
     }
 
-    /// True where the parts of a train have each their own, which add up to the whole train's.
+    /// Returns whether the parts of a train have each their own, which add up to the whole train's.
     pub fn adds_up(self) -> bool {
         use Quantity::*;
         matches!(
@@ -113,7 +113,7 @@ impl Quantity {
         )
     }
 
-    /// The unit in which it is held once read: the base unit of its dimension, but ‰ for the
+    /// Returns the unit in which it is held once read: the base unit of its dimension, but ‰ for the
     /// gradient.
     pub fn unit(self) -> Unit {
         let name = match self {

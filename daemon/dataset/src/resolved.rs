@@ -102,7 +102,7 @@ impl<'d> Resolved<'d> {
         }
     }
 
-    /// The samples, one for each row, as they are made.
+    /// Returns the samples, one for each row, as they are made.
     ///
     /// The mass is the row's, else the run's declared one, else that of the empty train and its
     /// counted passengers.
@@ -193,7 +193,7 @@ fn mend_times(table: &mut Table, timeless_before: &mut [u64]) -> ClockFaults {
     faults
 }
 
-/// The gradient that the samples carry, and where the gradient comes from first.
+/// Returns the gradient that the samples carry, and where the gradient comes from first.
 ///
 /// A mapped `gradient` goes into the samples whatever the line's file says, since it counts
 /// where the position is missing.

@@ -90,7 +90,7 @@ pub struct Run {
 const FORCES: u16 = SampleField::TractionForce.bit() | SampleField::BrakeForce.bit();
 
 impl Run {
-    /// The power in W that the traction force comes from, one value for each sample, and whether it
+    /// Returns the power in W that the traction force comes from, one value for each sample, and whether it
     /// holds what is fed in addition to the drive; `None` where the force comes from elsewhere.
     pub fn power(&self) -> Option<(&[Option<f64>], bool)> {
         if self.traction_source != ForceSource::Power {
@@ -138,7 +138,7 @@ impl Run {
         }
     }
 
-    /// Whether a sample has a force.
+    /// Returns whether a sample has a force.
     pub fn has_forces(&self) -> bool {
         self.samples.iter().any(|sample| sample.valid & FORCES != 0)
     }
@@ -306,7 +306,7 @@ pub fn recorded_unix_s(
     recorded(manifest, entry, table.first_day, times_s.find(|time_s| !time_s.is_nan())?)
 }
 
-/// True where a run's times are those of a day.
+/// Returns whether a run's times are those of a day.
 fn counts_from_midnight(manifest: &Manifest, entry: &RunEntry) -> bool {
     let has_format = manifest.mapping(Quantity::Time).is_some_and(|it| it.format.is_some());
     has_format && !is_parquet(&entry.file)
@@ -338,7 +338,7 @@ fn extras(table: &Table) -> Vec<(Quantity, QuantitySeries)> {
     EXTRAS.into_iter().filter_map(extra).collect()
 }
 
-/// True for the name of a Parquet file, which a run may be in place of CSV.
+/// Returns true for the name of a Parquet file, which a run may be in place of CSV.
 pub fn is_parquet(path: &str) -> bool {
     path.ends_with(".parquet")
 }

@@ -77,18 +77,18 @@ impl Placement {
         }
     }
 
-    /// Chainage in m of the point that positions are of, by the centre's.
+    /// Returns the chainage in m of the point that positions are of, by the centre's.
     pub fn reference_m(self, centre_m: f64) -> f64 {
         centre_m - self.to_centre_m()
     }
 
-    /// Chainage in m of the train's centre from the mapped column.
+    /// Returns the chainage in m of the train's centre from the mapped column.
     pub fn centre_m(self, column: &[f64]) -> Vec<f64> {
         let to_centre_m = self.to_centre_m();
         column.iter().map(|position| position + to_centre_m).collect()
     }
 
-    /// Chainage in m of the train's centre, integrated from the speed.
+    /// Returns the chainage in m of the train's centre, integrated from the speed.
     ///
     /// The speed is taken as linear between the rows that have one, over missing rows, missing
     /// speeds and spikes too. Without a declared start, the centre starts at 0. Rows out of

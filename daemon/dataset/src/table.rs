@@ -41,22 +41,22 @@ pub struct LineCounts {
 }
 
 impl Table {
-    /// The values of a quantity; `None` when it is not mapped.
+    /// Returns the values of a quantity; `None` when it is not mapped.
     pub fn column(&self, quantity: Quantity) -> Option<&[f64]> {
         self.columns.iter().find(|(other, _)| *other == quantity).map(|(_, values)| &values[..])
     }
 
-    /// The values of a quantity, when at least one is there.
+    /// Returns the values of a quantity, when at least one is there.
     pub fn filled(&self, quantity: Quantity) -> Option<&[f64]> {
         self.column(quantity).filter(|values| values.iter().any(|value| !value.is_nan()))
     }
 
-    /// The line of the file, from 1, in which a row stands.
+    /// Returns the line of the file, from 1, in which a row stands.
     pub fn line(&self, row: usize) -> usize {
         self.line_of_row.get(row).copied().unwrap_or(0)
     }
 
-    /// The mapped columns with their values.
+    /// Returns the mapped columns with their values.
     pub fn columns(&self) -> impl Iterator<Item = (Quantity, &[f64])> {
         self.columns.iter().map(|(quantity, values)| (*quantity, &values[..]))
     }
@@ -234,8 +234,8 @@ impl Rows<'_> {
         let _ = self.line_of_row.try_reserve(rows);
     }
 
-    /// True for a row in which words stand where values are expected and no value does: a footer, the names again,
-    /// what a power cut leaves.
+    /// Returns true for a row in which words stand where values are expected and no value does: a footer, the names
+    /// again, what a power cut leaves.
     fn is_note(&self, row: &CellRow) -> bool {
         let mut cells = self.columns.iter().flat_map(|column| &column.indices);
         let first = cells.clone().next().map_or(&b""[..], |&index| row.trimmed(index));

@@ -1,4 +1,4 @@
-//! How the text of a dataset's runs falls into cells, and in which letters a file is written.
+//! Splitting the text of a dataset's runs into cells, and the encoding of a file.
 
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
@@ -19,7 +19,7 @@ pub(crate) struct Marks {
 }
 
 impl Marks {
-    /// A point and nothing, or a comma and nothing.
+    /// Returns a point and nothing, or a comma and nothing.
     pub const fn plain(decimal: u8) -> Self {
         Marks { decimal, thousands: None }
     }
@@ -92,7 +92,7 @@ impl TextLayout {
         Ok(layout)
     }
 
-    /// The marks of its numbers.
+    /// Returns the marks of its numbers.
     pub(super) fn marks(&self) -> Marks {
         Marks { decimal: self.decimal, thousands: self.thousands }
     }
@@ -148,12 +148,12 @@ impl TrainRows {
 /// The encodings that messages propose; every other of the WHATWG's list is known, too.
 pub(super) const USUAL: [&str; 5] = ["utf-8", "windows-1252", "iso-8859-2", "utf-16le", "utf-16be"];
 
-/// The encoding of this name, as `utf-8`, `windows-1252`, `cp1252` or `latin1`.
+/// Returns the encoding of this name, as `utf-8`, `windows-1252`, `cp1252` or `latin1`.
 pub fn by_name(name: &str) -> Option<&'static Encoding> {
     Encoding::for_label_no_replacement(name.as_bytes())
 }
 
-/// The encoding of bytes that nobody described: UTF-16 where they begin so, UTF-8 where they are such,
+/// Returns the encoding of bytes that nobody described: UTF-16 where they begin so, UTF-8 where they are such,
 /// else that of Western European Windows, unless they hold what no text does.
 pub fn guessed(bytes: &[u8]) -> &'static Encoding {
     match bytes {
@@ -168,7 +168,7 @@ fn is_no_letter(byte: &u8) -> bool {
     byte.is_ascii_control() && !byte.is_ascii_whitespace()
 }
 
-/// The text of a run's file in its declared encoding.
+/// Returns the text of a run's file in its declared encoding.
 ///
 /// # Errors
 ///
@@ -188,7 +188,7 @@ pub fn decoded(bytes: Vec<u8>, encoding: &'static Encoding) -> Result<String, Fi
     Err(FileProblem::OtherEncoding { line: line_of_first_loss(&text), expected: encoding.name() })
 }
 
-/// The line, from 1, of the first letter that stands for what could not be read.
+/// Returns the line, from 1, of the first letter that stands for what could not be read.
 fn line_of_first_loss(text: &str) -> usize {
     let good = text.split('\u{fffd}').next().unwrap_or_default();
     1 + good.matches('\n').count()

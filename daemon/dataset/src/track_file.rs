@@ -87,7 +87,7 @@ fn place_of(error: &TrackError, lists: &[(&str, Placed); 3], section: &Item) -> 
     entry.map_or_else(|| section.place_of(name), |(_, entry)| entry.place())
 }
 
-/// Number of the entry, from 1, that an error of a profile means.
+/// Returns the number of the entry, from 1, that an error of a profile means.
 fn index_of(error: &ProfileError) -> Option<usize> {
     match error {
         ProfileError::Empty => None,
@@ -97,7 +97,7 @@ fn index_of(error: &ProfileError) -> Option<usize> {
     }
 }
 
-/// A list of pairs of chainage in m and an allowed value, with the place of each.
+/// Returns a list of pairs of chainage in m and an allowed value, with the place of each.
 #[expect(clippy::type_complexity, reason = "a list and its places, taken apart at once")]
 fn pairs<'t>(
     section: &Item<'t>,

@@ -102,7 +102,7 @@ fn read_brake(section: &Item, train: &mut TrainModel) -> Result<(), DatasetError
     Ok(())
 }
 
-/// The curve under `effort`, from [speed_mps, force kN].
+/// Returns the curve under `effort`, from [speed_mps, force kN].
 fn effort<'t>(section: &Item<'t>, key: &FileKey) -> Result<Option<EffortCurve>, DatasetError> {
     let Some(entries) = key.entries::<2>(section)? else { return Ok(None) };
     let point = |([speed_mps, force_kn], entry): ([f64; 2], Item<'t>)| {

@@ -23,7 +23,7 @@ const FIRST_ROW_LINE: usize = 2;
 /// Trains that a message names at most.
 const SHOWN_MAX: usize = 8;
 
-/// True for a column's name that says whose the rows are.
+/// Returns true for a column's name that says whose the rows are.
 pub fn names_trains(name: &str) -> bool {
     let letters = name.chars().filter(|letter| letter.is_alphanumeric());
     let folded: String = letters.flat_map(char::to_lowercase).collect();
@@ -54,7 +54,7 @@ impl TrainCells {
         }
     }
 
-    /// The trains by the column of this name; `None` where the cells name no several.
+    /// Returns the trains by the column of this name; `None` where the cells name no several.
     pub fn column(self, name: String) -> Option<TrainsColumn> {
         let TrainCells { trains, changes, .. } = self;
         let is_mark = |it: &String| truth(it.as_bytes()).is_some() || ["0", "1"].contains(&&it[..]);
@@ -75,7 +75,7 @@ pub struct TrainsColumn {
 }
 
 impl TrainsColumn {
-    /// The trains that a text's rows are of; `None` where no column names several.
+    /// Returns the trains that a text's rows are of; `None` where no column names several.
     pub fn of(text: &str, layout: &TextLayout) -> Option<Self> {
         let (name, index) = column(text, layout, names_trains)?;
         let mut cells = TrainCells::default();
@@ -85,19 +85,19 @@ impl TrainsColumn {
         cells.column(name)
     }
 
-    /// The trains that a table's rows are of; `None` where its column names no several.
+    /// Returns the trains that a table's rows are of; `None` where its column names no several.
     pub(super) fn of_table(column: &TrainColumn) -> Option<Self> {
         let mut cells = TrainCells::default();
         column.cells().zip(FIRST_ROW_LINE..).for_each(|(cell, line)| cells.push(cell, line));
         cells.column(column.name.clone())
     }
 
-    /// True where a train comes again after another: no train changes its number so.
+    /// Returns whether a train comes again after another: no train changes its number so.
     pub fn is_interleaved(&self) -> bool {
         self.changes.len() >= self.trains.len()
     }
 
-    /// True where from one train to another the time does not go on, or the position jumps under way.
+    /// Returns whether from one train to another the time does not go on, or the position jumps under way.
     fn begins_anew(&self, table: &Table) -> bool {
         let column = |quantity| table.column(quantity).unwrap_or_default();
         let (times_s, speeds) = (column(Quantity::Time), column(Quantity::Speed));
@@ -138,7 +138,7 @@ impl TrainsColumn {
     }
 }
 
-/// A text with the rows of one train alone; lines of others are empty.
+/// Returns a text with the rows of one train alone; lines of others are empty.
 ///
 /// # Errors
 ///
@@ -197,7 +197,7 @@ fn no_column(label: &str, line: usize, name: &str) -> DatasetError {
     SourcePosition::line(label, line).problem(words)
 }
 
-/// The error of a train that has no row; `found` are those of a column that names trains.
+/// Returns the error of a train that has no row; `found` are those of a column that names trains.
 fn no_row(label: &str, (name, value): (&str, &str), found: Option<TrainsColumn>) -> DatasetError {
     let found = found.filter(|it| it.name == name);
     let found = found.map_or(String::new(), |it| format!("; {}", it.words()));
@@ -205,7 +205,7 @@ fn no_row(label: &str, (name, value): (&str, &str), found: Option<TrainsColumn>)
     SourcePosition::whole(label).problem(words)
 }
 
-/// Name and place of the first column whose name passes.
+/// Returns the name and place of the first column whose name passes.
 fn column(
     text: &str,
     layout: &TextLayout,

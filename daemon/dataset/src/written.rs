@@ -79,13 +79,13 @@ impl TomlText {
         let _ = writeln!(self.text, "{line}");
     }
 
-    /// The text.
+    /// Returns the text.
     pub fn into_text(self) -> String {
         self.text
     }
 }
 
-/// True for an entry that the files may hold in addition to what they hold already.
+/// Returns true for an entry that the files may hold in addition to what they hold already.
 pub fn can_hold(entry: &ModelEntry, train: &Table, track: &Table) -> bool {
     match entry {
         ModelEntry::Number(key, found) => key.rule.allows(joined(key, train, *found)),
@@ -119,7 +119,7 @@ pub fn write_entry(entry: ModelEntry, train: &mut Table, track: &mut Table) {
     }
 }
 
-/// A table of `[[extra]]`.
+/// Returns a table of `[[extra]]`.
 fn extra_table(found: &ExtraResistance) -> Table {
     let of_factor = |it: &CovariateFactor| {
         let named = [(factor::OF, it.of.name()), (factor::FORM, it.form.name())];
@@ -135,12 +135,12 @@ fn extra_table(found: &ExtraResistance) -> Table {
     ])
 }
 
-/// A number that was found with the one that stands in the file.
+/// Returns a number that was found with the one that stands in the file.
 fn joined(key: &Key, train: &Table, found: f64) -> f64 {
     number(train, key.table, key.name).map_or(found, |declared| key.rule.join(declared, found))
 }
 
-/// A list of `[track]`, made when absent.
+/// Returns a list of `[track]`, made when absent.
 fn track_list<'t>(track: &'t mut Table, key: &str) -> Option<&'t mut Vec<Value>> {
     let section = track.entry(track::TABLE).or_insert_with(|| Value::Table(Table::new()));
     section.as_table_mut()?.entry(key).or_insert_with(|| Value::Array(Vec::new())).as_array_mut()
@@ -178,13 +178,13 @@ pub fn name_model(manifest: &mut Table, train: &str, track: Option<&str>) {
     }
 }
 
-/// The files of the runs in a `dataset.toml`.
+/// Returns the files of the runs in a `dataset.toml`.
 pub fn run_files(manifest: &mut Table) -> impl Iterator<Item = &mut String> {
     let runs = manifest.get_mut(keys::run::TABLE).and_then(Value::as_array_mut);
     runs.into_iter().flatten().filter_map(|run| text_of(run.get_mut(keys::run::FILE.name)?))
 }
 
-/// The files of the ways on the map in a `track.toml`.
+/// Returns the files of the ways on the map in a `track.toml`.
 pub fn alignment_files(file: &mut Table) -> impl Iterator<Item = &mut String> {
     let section = file.get_mut(track::TABLE).and_then(Value::as_table_mut);
     let own = [track::ALIGNMENT.name, track::ALIGNMENT_FALLING.name];

@@ -42,7 +42,7 @@ macro_rules! estimator_kinds {
         pub enum EstimatorSettings { $( $(#[$meta])* $variant($settings), )* }
 
         impl EstimatorSettings {
-            /// The kind with its default settings; `None` for a kind that cannot be built.
+            /// Returns the kind with its default settings; `None` for a kind that cannot be built.
             #[allow(unreachable_patterns, reason = "the vocabulary may name kinds to come")]
             pub fn default_of(kind: PipelineKind) -> Option<Self> {
                 match kind {
@@ -53,7 +53,7 @@ macro_rules! estimator_kinds {
                 }
             }
 
-            /// The kind of estimator.
+            /// Returns the kind of estimator.
             pub fn kind(&self) -> PipelineKind {
                 match self { $( EstimatorSettings::$variant(_) => PipelineKind::$kind, )* }
             }
@@ -150,7 +150,7 @@ estimator_kinds! {
 }
 
 impl EstimatorSettings {
-    /// True when the estimator, so set, gives what a controller asks for.
+    /// Returns whether the estimator, so set, gives what a controller asks for.
     pub fn answers(&self, quantity: Quantity) -> bool {
         let reports = match self {
             EstimatorSettings::BrakeSmoother(settings) => Some(settings.reports),

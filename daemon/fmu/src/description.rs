@@ -15,8 +15,8 @@ const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// A step in s that suits every train, where no recording says another.
 pub const STEP_DEFAULT_S: f64 = 0.1;
 
-/// The text of `modelDescription.xml`, with the step in s that hosts take by default: the same for every FMU of this
-/// model in a release.
+/// Returns the text of `modelDescription.xml`, with the step in s that hosts take by default: the same for every FMU of
+/// this model in a release.
 pub fn model_description(interface: &Interface, step_s: f64) -> String {
     let Interface { identifier, name, about, guid, variables, takes_slopes, .. } = interface;
     let mut xml = format!(
@@ -142,7 +142,7 @@ fn start(meaning: Meaning) -> Option<String> {
     }
 }
 
-/// Indices of variables as the standard counts them, from 1.
+/// Returns the indices of variables as the standard counts them, from 1.
 fn indices(interface: &Interface, is_wanted: impl Fn(&Variable) -> bool) -> Vec<String> {
     let numbered = interface.variables.iter().zip(1..);
     let wanted = numbered.filter(|(variable, _)| is_wanted(variable));
@@ -159,7 +159,7 @@ fn push_unknowns(xml: &mut String, interface: &Interface, list: &str, on: Option
     push(xml, format_args!("    </{list}>"));
 }
 
-/// A page for people: what the FMU takes and gives.
+/// Returns a page for people: what the FMU takes and gives.
 pub fn documentation(interface: &Interface) -> String {
     let Interface { name, about, step, variables, .. } = interface;
     let mut page = format!(
@@ -197,7 +197,7 @@ fn push(text: &mut String, line: std::fmt::Arguments<'_>) {
     writeln!(text, "{line}").expect("a text takes any line");
 }
 
-/// Text between tags or in double quotes.
+/// Returns the text between tags or in double quotes.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }

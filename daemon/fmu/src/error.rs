@@ -1,4 +1,4 @@
-//! Why a call is refused.
+//! Reasons why a call is refused.
 
 use std::path::PathBuf;
 

@@ -163,7 +163,7 @@ impl Estimators {
         place.and_then(|place| self.pipelines.get(place)).map_or(&NOTHING, Pipeline::snapshot)
     }
 
-    /// A number, where it is known.
+    /// Returns a number, where it is known.
     pub fn real(&self, of: PipelineKind, reported: SnapshotField) -> Option<f64> {
         let snapshot = self.snapshot(of);
         match reported {
@@ -179,7 +179,7 @@ impl Estimators {
         }
     }
 
-    /// A whole number, or the number of a member of a vocabulary.
+    /// Returns a whole number, or the number of a member of a vocabulary.
     pub fn integer(&self, of: PipelineKind, reported: SnapshotField) -> u64 {
         let snapshot = self.snapshot(of);
         match reported {

@@ -1,4 +1,4 @@
-//! Where the FMU was unpacked, the files that describe train and line, and the models for them.
+//! The folder where the FMU was unpacked, the files that describe train and line, and the models for them.
 
 use std::ffi::{CStr, CString, OsString};
 use std::io::ErrorKind;
@@ -22,7 +22,7 @@ use super::variables::ModelFile;
 pub const TRAIN: TrainId = TrainId(1);
 
 impl ModelFile {
-    /// The file's name inside the FMU, in the folder `resources`.
+    /// Returns the file's name inside the FMU, in the folder `resources`.
     pub const fn own_name(self) -> &'static str {
         match self {
             ModelFile::Train => "train.toml",
@@ -41,17 +41,17 @@ pub struct DescriptionFiles {
 }
 
 impl DescriptionFiles {
-    /// The FMU's own files at a location, as the simulator names it.
+    /// Returns the FMU's own files at a location, as the simulator names it.
     pub fn of(resources: String) -> Self {
         DescriptionFiles { resources, train: CString::default(), track: CString::default() }
     }
 
-    /// Where the FMU's own files are.
+    /// Returns where the FMU's own files are.
     pub fn resources(&self) -> String {
         self.resources.clone()
     }
 
-    /// The path that was set.
+    /// Returns the path that was set.
     pub fn path(&self, file: ModelFile) -> &CStr {
         match file {
             ModelFile::Train => &self.train,
@@ -67,7 +67,7 @@ impl DescriptionFiles {
         }
     }
 
-    /// The recommended estimators for this train on this line.
+    /// Returns the recommended estimators for this train on this line.
     ///
     /// # Errors
     ///
@@ -83,7 +83,7 @@ impl DescriptionFiles {
         Ok(Estimators::new(pipelines?))
     }
 
-    /// This train on this line, to be driven.
+    /// Returns this train on this line, to be driven.
     ///
     /// # Errors
     ///
@@ -123,7 +123,7 @@ impl DescriptionFiles {
         Ok(Some(parse_track(&path.display().to_string(), &text)?))
     }
 
-    /// Where a file lies; a relative path counts from the FMU's own files.
+    /// Returns where a file lies; a relative path counts from the FMU's own files.
     fn place(&self, file: ModelFile) -> Result<PathBuf, ModelError> {
         let set = self.path(file).to_string_lossy();
         let path = Path::new(if set.is_empty() { file.own_name() } else { &*set });
@@ -141,7 +141,7 @@ fn text_of(path: &Path) -> Result<String, ModelError> {
     std::fs::read_to_string(path).map_err(unreadable)
 }
 
-/// The folder that a `file:` URI means (RFC 8089), or a plain absolute path; `None` for any other.
+/// Returns the folder that a `file:` URI means (RFC 8089), or a plain absolute path; `None` for any other.
 pub fn folder_of(location: &str) -> Option<PathBuf> {
     let Some(rest) = location.strip_prefix("file:") else {
         return location.starts_with('/').then(|| location.into());

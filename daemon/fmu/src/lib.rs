@@ -13,8 +13,8 @@
 //! - [`description`]: both of them, as `modelDescription.xml` and as pages for people
 //! - [`error`]: why a call is refused
 //! - [`files`]: where the FMU was unpacked, the files of train and line, and the models for them
-//! - [`inputs`]: what acts during a step
-//! - [`model`]: what stands behind an instance: inputs, one of the models, the order of calls
+//! - [`inputs`]: inputs during a step
+//! - [`model`]: the model behind an instance: inputs, one of the models, the order of calls
 //! - [`ffi`]: the functions that a simulator calls
 
 pub mod description;

@@ -66,7 +66,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// An instance with the start value of every variable; `resources` is the location of the FMU's
+    /// Returns an instance with the start value of every variable; `resources` is the location of the FMU's
     /// own files, as the simulator names it.
     pub fn new(interface: &'static Interface, resources: String) -> Self {
         Model {
@@ -207,7 +207,7 @@ impl Model {
         self.phase = Phase::Broken;
     }
 
-    /// A variable's number.
+    /// Returns a variable's number.
     ///
     /// # Errors
     ///
@@ -227,7 +227,7 @@ impl Model {
         })
     }
 
-    /// A variable's whole number, or the number of a member of a vocabulary.
+    /// Returns a variable's whole number, or the number of a member of a vocabulary.
     ///
     /// # Errors
     ///
@@ -243,7 +243,7 @@ impl Model {
         Ok(i32::try_from(number).unwrap_or(i32::MAX))
     }
 
-    /// A variable's truth value.
+    /// Returns a variable's truth value.
     ///
     /// # Errors
     ///
@@ -258,7 +258,7 @@ impl Model {
         })
     }
 
-    /// A variable's text, valid until it is set.
+    /// Returns a variable's text, valid until it is set.
     ///
     /// # Errors
     ///
@@ -390,7 +390,7 @@ impl Model {
     }
 }
 
-/// A time in s, where it is one.
+/// Returns a time in s, where it is one.
 fn require_time(name: &'static str, time_s: f64) -> Result<f64, ModelError> {
     if time_s.abs() <= TIME_MAX_S {
         return Ok(time_s);

@@ -1,4 +1,4 @@
-//! The model that is driven: force in, speed out, with what was found; and every variable of it.
+//! The driven train, with the effects found: force in, speed out; and its variables.
 
 use dynocar_analysis::driven::{Beginning, DrivenTrain, ForcePart};
 use dynocar_model::simulate::motion::SPEED_MAX_MPS;
@@ -105,7 +105,7 @@ pub(crate) fn require_drivable(inputs: &Inputs) -> Result<(), ModelError> {
 /// A longer step in s is refused: a simulator that skips hours has lost its way.
 pub const STEP_MAX_S: f64 = 3600.0;
 
-/// A shorter step in s would push out of memory what a dead time still needs.
+/// Returns a shorter step in s would push out of memory what a dead time still needs.
 pub(crate) fn least_step_s(train: &DrivenTrain) -> f64 {
     train.dead_time_s() / 1000.0
 }

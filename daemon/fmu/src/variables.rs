@@ -31,7 +31,7 @@ pub struct Interface {
 pub const MISSING: f64 = 1e30;
 
 impl Interface {
-    /// The variable of a reference and a type; enumerations are got and set as whole numbers.
+    /// Returns the variable of a reference and a type; enumerations are got and set as whole numbers.
     ///
     /// # Errors
     ///
@@ -175,7 +175,7 @@ pub enum FmiEnumeration {
 }
 
 impl FmiEnumeration {
-    /// The type's name.
+    /// Returns the type's name.
     pub const fn name(self) -> &'static str {
         match self {
             FmiEnumeration::Status => "Status",
@@ -186,7 +186,7 @@ impl FmiEnumeration {
 }
 
 impl Kind {
-    /// The type's name in `modelDescription.xml`.
+    /// Returns the type's name in `modelDescription.xml`.
     pub const fn name(self) -> &'static str {
         match self {
             Kind::Real => "Real",
@@ -199,7 +199,7 @@ impl Kind {
 }
 
 impl Meaning {
-    /// The type of the variable.
+    /// Returns the type of the variable.
     pub const fn kind(self) -> Kind {
         match self {
             Meaning::File(_) => Kind::String,
@@ -244,7 +244,7 @@ pub struct Variable {
     pub description: &'static str,
 }
 
-/// A variable.
+/// Returns a variable.
 pub(crate) const fn row(
     name: &'static str,
     meaning: Meaning,
@@ -254,7 +254,7 @@ pub(crate) const fn row(
     Variable { name, meaning, unit, description }
 }
 
-/// An input that the sample of a step takes.
+/// Returns an input that the sample of a step takes.
 pub(crate) const fn measured(
     name: &'static str,
     field: SampleField,
@@ -264,7 +264,7 @@ pub(crate) const fn measured(
     row(name, Meaning::Measured(field), unit, description)
 }
 
-/// The digits by which description and library know each other: over the version, the model's
+/// Returns the digits by which description and library know each other: over the version, the model's
 /// identifier and its table of `N` variables.
 pub(crate) const fn guid<const N: usize>(identifier: &str, variables: &[Variable]) -> [u8; 16] {
     let mut fields = [FieldLayout { name: "", type_name: "", offset: 0, size: 0 }; N];

@@ -32,7 +32,7 @@ struct Arguments {
     port: u16,
 }
 
-/// The command line of `dynocar live`.
+/// Returns the command line of `dynocar live`.
 pub fn command() -> clap::Command {
     Arguments::command()
 }

@@ -1,5 +1,4 @@
-//! `dynocar live`: what a controller and the daemon write, served to viewers as it comes, by the
-//! Foxglove WebSocket protocol.
+//! `dynocar live`: samples and snapshots served to viewers as they come, by the Foxglove WebSocket protocol.
 //!
 //! Topics, schemas and messages are those of a recording (`dynocar_mcap`), and the channels are
 //! read by the same readers: what is seen live is what would be recorded, but for the samples, of which

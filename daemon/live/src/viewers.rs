@@ -90,7 +90,7 @@ impl Viewers {
         Ok(viewers)
     }
 
-    /// Where a server takes its channels from.
+    /// Returns where a server takes its channels from.
     pub fn context(&self) -> &Arc<Context> {
         &self.context
     }
@@ -218,7 +218,7 @@ impl Thinning {
         Thinning { interval_ns, due_ns: i64::MIN }
     }
 
-    /// True where what came at this moment is to go on.
+    /// Returns whether what came at this moment is to go on.
     pub fn lets_through(&mut self, at_ns: i64) -> bool {
         if at_ns < self.due_ns && self.due_ns.saturating_sub(at_ns) <= self.interval_ns {
             return false;

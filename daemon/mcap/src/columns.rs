@@ -137,7 +137,7 @@ fn nullable(column: RecordingColumn) -> RecordingColumn {
     RecordingColumn { is_nullable: true, ..column }
 }
 
-/// The column of a layout's field; `None` for one that is said by others.
+/// Returns the column of a layout's field; `None` for one that is said by others.
 fn of_field(field: &'static Field) -> Option<RecordingColumn> {
     let name = field.layout.name;
     let column = plain(name.into(), field.entry_type(), field.meaning, ColumnSource::Field(field));
@@ -154,12 +154,12 @@ fn of_field(field: &'static Field) -> Option<RecordingColumn> {
 }
 
 impl RecordingColumn {
-    /// A column that stands beside those of messages.
+    /// Returns a column that stands beside those of messages.
     pub fn beside(name: &str, type_name: &'static str, is_nullable: bool) -> Self {
         RecordingColumn { is_nullable, ..plain(name.into(), type_name, "", ColumnSource::Number) }
     }
 
-    /// The type of an entry in Arrow's words.
+    /// Returns the type of an entry in Arrow's words.
     pub fn entry_arrow_type(&self) -> &'static str {
         match self.type_name {
             "f64" => "Float64",
@@ -176,7 +176,7 @@ impl RecordingColumn {
         }
     }
 
-    /// The type in Arrow's words.
+    /// Returns the type in Arrow's words.
     pub fn arrow_type(&self) -> String {
         let entry = self.entry_arrow_type();
         match self.list {
@@ -185,14 +185,14 @@ impl RecordingColumn {
         }
     }
 
-    /// The numbers and names of its vocabulary in words; empty without one.
+    /// Returns the numbers and names of its vocabulary in words; empty without one.
     pub fn names(&self) -> String {
         let members = self.vocabulary.map(members_of).unwrap_or_default();
         let members = members.iter().map(|(number, name)| format!("{number} {name}"));
         members.collect::<Vec<_>>().join(", ")
     }
 
-    /// True for a column that only repeats what others hold.
+    /// Returns true for a column that only repeats what others hold.
     pub fn is_repetition(&self) -> bool {
         matches!(
             self.source,
@@ -202,7 +202,7 @@ impl RecordingColumn {
 }
 
 impl RecordingRow {
-    /// The same for whoever writes messages.
+    /// Returns the same for whoever writes messages.
     pub fn message(&self) -> Message<'_> {
         match self {
             RecordingRow::Sample(it) => Message::Sample(it),

@@ -40,7 +40,7 @@ pub fn recover(from: &[PathBuf], to: &Path) -> Result<Copied, CopyError> {
     recover_on(&Disk, from, to)
 }
 
-/// The same on any storage.
+/// Returns the same on any storage.
 ///
 /// # Errors
 ///
@@ -220,7 +220,7 @@ pub fn read_among<V: Visitor>(
     read(path, visitor)
 }
 
-/// True for a file without a byte other than 0, and for one that ends within the first bytes of MCAP.
+/// Returns true for a file without a byte other than 0, and for one that ends within the first bytes of MCAP.
 fn is_nothing(path: &Path) -> bool {
     let Ok(file) = File::open(path) else { return false };
     let mut start = Vec::new();

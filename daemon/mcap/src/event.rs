@@ -55,7 +55,7 @@ impl Event {
         EventKind::from_number(self.kind as u32).unwrap_or(EventKind::Unknown)
     }
 
-    /// The number in a field by its place in [`Event::FIELDS`], in two's complement; `None` where it is
+    /// Returns the number in a field by its place in [`Event::FIELDS`], in two's complement; `None` where it is
     /// missing, and for the text.
     pub fn word(&self, index: usize) -> Option<u64> {
         match index {

@@ -1,5 +1,5 @@
-//! Recordings of what a controller and the daemon write, as [MCAP](https://mcap.dev) files with
-//! protobuf messages: read, written, copied and annotated. Recording itself is another package's.
+//! Recordings of samples and snapshots as [MCAP](https://mcap.dev) files with protobuf messages: read, written, copied
+//! and annotated. Another package records.
 //!
 //! Samples are the truth of a recording: the daemon's pipelines are functions of them, so that every
 //! snapshot can be computed again, and is, by `dynocar replay --verify`.
@@ -9,14 +9,14 @@
 //! - [`schema`]: the protobuf messages, made from the layouts of sample and snapshot
 //! - [`columns`]: the same as columns of tables, for whoever writes tables
 //! - [`codec`]: samples and snapshots as messages, and back, to the bit
-//! - [`event`]: what happens around them
+//! - [`event`]: events around them
 //! - [`message`]: messages that are declared once
 //! - [`topic`]: the streams of messages, and the messages
 //! - [`writing`], [`reading`]: MCAP files, written without seeking and read as far as they are whole
 //! - [`recording`]: a recording, of one file or more, in memory, in the order in which it was recorded
 //! - [`copying`]: copies of recordings, ours or not: a broken file made whole
 //! - [`annotate`]: an explanation beside the data
-//! - [`error`]: what is wrong with a file, and which
+//! - [`error`]: errors of files, with their paths
 
 pub mod annotate;
 pub mod codec;

@@ -58,7 +58,7 @@ macro_rules! message {
 
 pub(crate) use message;
 
-/// The vocabulary, or else Rust's name of a protobuf type.
+/// Returns the vocabulary, or else Rust's name of a protobuf type.
 pub const fn type_name(kind: &str, vocabulary: &'static str) -> &'static str {
     match kind.as_bytes() {
         _ if !vocabulary.is_empty() => vocabulary,

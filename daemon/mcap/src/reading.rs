@@ -33,7 +33,7 @@ pub enum FileEnding {
 }
 
 impl FileEnding {
-    /// Where a file breaks off, in words; `None` for a whole one.
+    /// Returns where a file breaks off, in words; `None` for a whole one.
     pub fn words(&self, path: &Path) -> Option<String> {
         let FileEnding::Broken { read_bytes, file_bytes, reason } = self else { return None };
         let shown = path.display();
@@ -287,7 +287,7 @@ fn require_our_layout(channel: &ChannelInfo) -> Result<(), ReadProblem> {
     }
 }
 
-/// True when an attachment's record holds its two times, its two texts, its length and its checksum:
+/// Returns whether an attachment's record holds its two times, its two texts, its length and its checksum:
 /// the parser takes that for granted.
 fn has_room_for_its_parts(record: &[u8]) -> bool {
     let text_end = |start: usize| {

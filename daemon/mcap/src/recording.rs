@@ -69,7 +69,7 @@ impl Recording {
         Recording::load_all(&[path.into()])
     }
 
-    /// The same of a recording that rotated: its files in order.
+    /// Returns the same of a recording that rotated: its files in order.
     ///
     /// # Errors
     ///
@@ -82,7 +82,7 @@ impl Recording {
         Logged::default().read(paths)
     }
 
-    /// The same without its snapshots and events, which are counted.
+    /// Returns the same without its snapshots and events, which are counted.
     ///
     /// # Errors
     ///
@@ -95,13 +95,13 @@ impl Recording {
         Logged { keeps_samples_only: true, ..Logged::default() }.read(paths)
     }
 
-    /// The files of the dataset that is attached, by their names in it.
+    /// Returns the files of the dataset that is attached, by their names in it.
     pub fn attached_dataset(&self) -> impl Iterator<Item = (&str, &Vec<u8>)> {
         let files = self.attachments.iter();
         files.filter_map(|(name, content)| Some((name.strip_prefix(DATASET_FOLDER)?, content)))
     }
 
-    /// The trains that there are samples of, in order.
+    /// Returns the trains that there are samples of, in order.
     pub fn trains(&self) -> Vec<u64> {
         trains_of(self.samples.iter().map(|it| it.train_id))
     }
@@ -163,7 +163,7 @@ impl Logged {
     }
 }
 
-/// The trains of samples, in order, each once.
+/// Returns the trains of samples, in order, each once.
 pub fn trains_of(samples: impl Iterator<Item = u64>) -> Vec<u64> {
     samples.collect::<BTreeSet<u64>>().into_iter().collect()
 }

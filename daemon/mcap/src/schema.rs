@@ -39,7 +39,7 @@ pub static SNAPSHOT_FIELDS: LazyLock<Vec<Field>> = LazyLock::new(|| snapshot_fie
 /// The messages of a recording, as the bytes that an MCAP schema holds.
 pub static DESCRIPTORS: LazyLock<Vec<u8>> = LazyLock::new(|| descriptors().encode_to_vec());
 
-/// True where other descriptors describe the fields of a message as this release's do.
+/// Returns whether other descriptors describe the fields of a message as this release's do.
 pub fn is_described_alike(message: &str, descriptors: &[u8]) -> bool {
     type Described = (Option<String>, Option<i32>, Option<i32>);
     let fields = |bytes: &[u8]| -> Option<Vec<Described>> {
@@ -57,12 +57,12 @@ pub fn is_described_alike(message: &str, descriptors: &[u8]) -> bool {
     other.is_some() && other == fields(&DESCRIPTORS)
 }
 
-/// The protobuf number of a layout's field.
+/// Returns the protobuf number of a layout's field.
 pub fn number(field: &Field) -> u32 {
     field.index as u32 + 1
 }
 
-/// The number of a parameter's value in `estimate`; those of its standard deviation and of the ends
+/// Returns the number of a parameter's value in `estimate`; those of its standard deviation and of the ends
 /// of its 95 % interval are greater, see [`SUFFIXES`].
 pub fn parameter_number(parameter: Parameter) -> u32 {
     parameter as u32
@@ -79,19 +79,19 @@ pub const SUFFIXES: [(u32, &str, &str, OfEstimate); 3] = [
     (300, "high", "The upper end of its 95 % interval.", |value, std| value + HALF_95 * std),
 ];
 
-/// The name of what is said of a parameter in addition to its value: the unit stays last.
+/// Returns the name of what is said of a parameter in addition to its value: the unit stays last.
 pub fn suffixed_name(parameter: Parameter, word: &str) -> String {
     let name = parameter.full_name();
     let unit = unit_end(name).0;
     format!("{}_{word}{unit}", &name[..name.len() - unit.len()])
 }
 
-/// The number of a reason's count in `rejected`.
+/// Returns the number of a reason's count in `rejected`.
 pub fn rejection_number(reason: RejectionReason) -> u32 {
     reason as u32 + 1
 }
 
-/// The vocabulary whose numbers a field of a snapshot holds.
+/// Returns the vocabulary whose numbers a field of a snapshot holds.
 pub fn vocabulary_of(name: &str) -> Option<&'static str> {
     Some(match name {
         "pipeline_kind" => "PipelineKind",
@@ -103,7 +103,7 @@ pub fn vocabulary_of(name: &str) -> Option<&'static str> {
     })
 }
 
-/// The vocabulary that a type of a table of fields is.
+/// Returns the vocabulary that a type of a table of fields is.
 pub fn vocabulary_of_type(type_name: &'static str) -> Option<&'static str> {
     type_name.starts_with(char::is_uppercase).then_some(type_name)
 }
@@ -126,7 +126,7 @@ fn descriptors() -> FileDescriptorSet {
     FileDescriptorSet { file: vec![file] }
 }
 
-/// A message; each optional field gets the group of its own that protobuf asks for.
+/// Returns a message; each optional field gets the group of its own that protobuf asks for.
 pub(crate) fn message(name: &str, mut fields: Vec<FieldDescriptorProto>) -> DescriptorProto {
     let mut groups = Vec::new();
     for field in fields.iter_mut().filter(|it| it.proto3_optional == Some(true)) {
@@ -155,7 +155,7 @@ fn typed(mut field: FieldDescriptorProto, of_type: Type, name: &str) -> FieldDes
     field
 }
 
-/// The protobuf type of a Rust type.
+/// Returns the protobuf type of a Rust type.
 pub fn scalar(type_name: &str) -> Type {
     match type_name {
         "f64" => Type::Double,
@@ -167,7 +167,7 @@ pub fn scalar(type_name: &str) -> Type {
     }
 }
 
-/// A field of a layout; `None` for one that is said by others.
+/// Returns a field of a layout; `None` for one that is said by others.
 fn layout_field(it: &Field) -> Option<FieldDescriptorProto> {
     let is_optional = match it.missing {
         Missing::Never => false,
@@ -210,7 +210,7 @@ fn rejected_message() -> Vec<FieldDescriptorProto> {
     RejectionReason::ALL.iter().map(of).collect()
 }
 
-/// The fields of a message by its table.
+/// Returns the fields of a message by its table.
 pub(crate) fn fields_of(table: &[MessageField]) -> Vec<FieldDescriptorProto> {
     let of = |it: &MessageField| {
         let made = field(it.name, it.number, scalar(it.type_name), it.is_optional);
@@ -222,7 +222,7 @@ pub(crate) fn fields_of(table: &[MessageField]) -> Vec<FieldDescriptorProto> {
     table.iter().map(of).collect()
 }
 
-/// Every vocabulary with its members' numbers and names.
+/// Returns every vocabulary with its members' numbers and names.
 fn vocabularies() -> Vec<(&'static str, Vec<(i32, &'static str)>)> {
     macro_rules! members {
         ($name:ident) => {
@@ -239,7 +239,7 @@ fn vocabularies() -> Vec<(&'static str, Vec<(i32, &'static str)>)> {
     ]
 }
 
-/// The members of a vocabulary: numbers and names.
+/// Returns the members of a vocabulary: numbers and names.
 pub fn members_of(vocabulary: &str) -> Vec<(i32, &'static str)> {
     let found = vocabularies().into_iter().find(|it| it.0 == vocabulary);
     found.map(|it| it.1).unwrap_or_default()
@@ -249,7 +249,7 @@ fn enums() -> Vec<EnumDescriptorProto> {
     vocabularies().into_iter().map(|(name, members)| enumeration(name, &members)).collect()
 }
 
-/// An enumeration; protobuf asks for a member 0 and for names that are unique in the package.
+/// Returns an enumeration; protobuf asks for a member 0 and for names that are unique in the package.
 fn enumeration(name: &str, members: &[(i32, &str)]) -> EnumDescriptorProto {
     let unknown = members.iter().all(|it| it.0 != 0).then_some((0, "unknown_number"));
     let prefix: String = name

@@ -1,4 +1,4 @@
-//! The streams of messages, of recordings and of what is served live, and the messages.
+//! The streams of messages of a recording and of a live view.
 
 use dynocar::operator::pipeline_name;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};
@@ -25,7 +25,7 @@ pub enum Topic {
 }
 
 impl Topic {
-    /// Its name.
+    /// Returns its name.
     pub fn name(self) -> String {
         match self {
             Topic::Samples(train) => format!("/train/{train}/samples"),
@@ -37,7 +37,7 @@ impl Topic {
         }
     }
 
-    /// Name of its messages' schema, and the layout in shared memory that they are made from.
+    /// Returns the name of its messages' schema, and the layout in shared memory that they are made from.
     pub fn schema_and_layout(self) -> (&'static str, &'static str) {
         match self {
             Topic::Samples(_) => (SAMPLE, TrainSample::WIRE_NAME),
@@ -59,7 +59,7 @@ pub enum Message<'a> {
 }
 
 impl Message<'_> {
-    /// Its stream.
+    /// Returns its stream.
     pub fn topic(self) -> Topic {
         match self {
             Message::Sample(it) => Topic::Samples(it.train_id),
@@ -70,7 +70,7 @@ impl Message<'_> {
         }
     }
 
-    /// Its number in its stream, 0 for events, and when it was published, in ns of the host's monotonic clock.
+    /// Returns its number in its stream, 0 for events, and when it was published, in ns of the host's monotonic clock.
     pub fn number_and_time_ns(self) -> (u64, i64) {
         match self {
             Message::Sample(it) => (it.sequence, it.published_ns),

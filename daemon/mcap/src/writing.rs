@@ -1,4 +1,4 @@
-//! Writing MCAP files, without seeking: what has been flushed can be read, whatever happens next.
+//! Writing MCAP files without seeking: flushed messages can be read, whatever happens next.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
@@ -20,7 +20,7 @@ pub const METADATA: &str = "dynocar";
 /// Name of the metadata record beside an attached configuration.
 pub const CONFIGURATION: &str = "configuration";
 
-/// The folder in which a configuration of this number is attached.
+/// Returns the folder in which a configuration of this number is attached.
 pub fn folder_of_configuration(number: u32) -> String {
     format!("configuration-{number}")
 }
@@ -42,12 +42,12 @@ impl WallClock {
         WallClock { offset_ns: i64::try_from(wall).unwrap_or(i64::MAX) - monotonic_now_ns() }
     }
 
-    /// A clock on which both are the same, for what was recorded on another host.
+    /// Returns a clock on which both are the same, for what was recorded on another host.
     pub fn of_another_host() -> Self {
         WallClock { offset_ns: 0 }
     }
 
-    /// Nanoseconds since 1970 of a moment on the monotonic clock.
+    /// Returns the nanoseconds since 1970 of a moment on the monotonic clock.
     pub fn wall_ns(self, monotonic_ns: i64) -> u64 {
         u64::try_from(self.offset_ns.saturating_add(monotonic_ns)).unwrap_or(0)
     }

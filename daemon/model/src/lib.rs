@@ -8,7 +8,7 @@
 //! # Layout, in the order a sample takes
 //!
 //! - [`units`]: the units that quantities may be in
-//! - [`train`], [`track`]: what is declared of the train and the line
+//! - [`train`], [`track`]: the declared train and line
 //! - [`terms`]: the physical terms of the model, one law each, that all of the following share
 //! - [`force`]: the known forces on the train at a sample
 //! - [`simulate`]: the speed that a force model predicts over a recorded run

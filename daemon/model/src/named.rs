@@ -19,7 +19,7 @@ macro_rules! named {
                 match self { $( $name::$item => $text ),* }
             }
 
-            /// The member of this name.
+            /// Returns the member of this name.
             pub fn from_name(name: &str) -> Option<Self> {
                 Self::ALL.into_iter().find(|member| member.name() == name)
             }

@@ -230,7 +230,7 @@ static UNITS: [Unit; 80] = {
 const FOREIGN: &str = "ma mv hz khz rpm umin 1min nm knm kwh wh mwh j kj mj l lmin db ppm kva ohm gwh kvar var \
                        pas m3 m2 m3s kgs kgh lph gpm nms radps degs rads dbm pct100 cd lx mol wm2 wb";
 
-/// Name, dimension, factor and divisor to the base unit, and spellings.
+/// Returns the name, dimension, factor and divisor to the base unit, and spellings.
 const fn unit(
     name: &'static str,
     dimension: Dimension,
@@ -241,7 +241,7 @@ const fn unit(
     Unit { name, dimension, shift: 0.0, multiply, divide, spellings, is_usual: true }
 }
 
-/// A unit that is read where a file says it, and never guessed.
+/// Returns a unit that is read where a file says it, and never guessed.
 const fn rare(
     name: &'static str,
     dimension: Dimension,
@@ -278,20 +278,20 @@ fn fold(text: &str) -> String {
     letters.filter(|letter| letter.is_alphanumeric()).collect()
 }
 
-/// True for the spelling of any unit, of a dataset's or of another thing's.
+/// Returns true for the spelling of any unit, of a dataset's or of another thing's.
 pub fn is_unit(text: &str) -> bool {
     FOREIGN.split(' ').any(|unit| unit == fold(text))
         || Unit::all().any(|unit| Unit::spelled(unit.dimension, text).is_some())
 }
 
 impl Unit {
-    /// The unit of a dimension with this name.
+    /// Returns the unit of a dimension with this name.
     pub fn find(dimension: Dimension, name: &str) -> Option<Unit> {
         Self::of(dimension).find(|unit| unit.name == name)
     }
 
-    /// The unit of a dimension that is spelled so. The names come first, then case distinguishes nothing (but mN is
-    /// no MN).
+    /// Returns the unit of a dimension that is spelled so. The names come first, then case distinguishes nothing (but
+    /// mN is no MN).
     pub fn spelled(dimension: Dimension, text: &str) -> Option<Unit> {
         let text = text.trim();
         match (dimension, text) {
@@ -318,22 +318,22 @@ impl Unit {
         like.or_else(|| Self::of(dimension).find(by_list))
     }
 
-    /// Every unit.
+    /// Returns every unit.
     pub fn all() -> impl Iterator<Item = Unit> {
         UNITS.iter().copied()
     }
 
-    /// The units of a dimension.
+    /// Returns the units of a dimension.
     pub fn of(dimension: Dimension) -> impl Iterator<Item = Unit> {
         Self::all().filter(move |unit| unit.dimension == dimension)
     }
 
-    /// The units of a dimension that recorders use without saying so: what an unknown factor may be.
+    /// Returns the units of a dimension that recorders use without saying so: what an unknown factor may be.
     pub fn usual_of(dimension: Dimension) -> impl Iterator<Item = Unit> {
         Self::of(dimension).filter(|unit| unit.is_usual)
     }
 
-    /// The base unit of a dimension: the one without shift and scale.
+    /// Returns the base unit of a dimension: the one without shift and scale.
     pub fn base_of(dimension: Dimension) -> Unit {
         Self::of(dimension)
             .find(|unit| {
@@ -347,7 +347,7 @@ impl Unit {
         self.multiply / self.divide * other.divide / other.multiply
     }
 
-    /// The name, as written in a dataset.
+    /// Returns the name, as written in a dataset.
     pub fn name(&self) -> &'static str {
         self.name
     }
@@ -357,17 +357,17 @@ impl Unit {
         self.dimension
     }
 
-    /// A value in this unit, in the dimension's base unit.
+    /// Returns a value in this unit, in the dimension's base unit.
     pub fn to_base(&self, value: f64) -> f64 {
         (value + self.shift) * self.multiply / self.divide
     }
 
-    /// A value in the dimension's base unit, in this unit.
+    /// Returns a value in the dimension's base unit, in this unit.
     pub fn from_base(&self, base: f64) -> f64 {
         base * self.divide / self.multiply - self.shift
     }
 
-    /// A value in this unit, in another unit of the same dimension; exact for the same unit.
+    /// Returns a value in this unit, in another unit of the same dimension; exact for the same unit.
     pub fn convert(&self, value: f64, to: &Unit) -> f64 {
         if self.name == to.name { value } else { to.from_base(self.to_base(value)) }
     }

@@ -6,7 +6,7 @@ use dynocar_shared::vocabulary::{EffectKind, KindRow};
 /// Places named in a sentence at most.
 pub const PLACES_MAX: usize = 4;
 
-/// Name of a kind as the answer writes it, for a running text.
+/// Returns the name of a kind as the answer writes it, for a running text.
 pub fn kind_name(name: &str) -> &str {
     match EffectKind::from_name(name) {
         Some(known) => KindRow::of(known).title,
@@ -54,7 +54,7 @@ pub fn parameter(name: &str) -> (&str, &'static str) {
     }
 }
 
-/// The least that a parameter can be: what no interval reaches below.
+/// Returns the least that a parameter can be: what no interval reaches below.
 pub fn least(name: &str) -> f64 {
     match name {
         "c_factor"
@@ -73,7 +73,7 @@ pub fn least(name: &str) -> f64 {
     }
 }
 
-/// A value with the digits that its uncertainty leaves meaningful: two of the uncertainty's.
+/// Returns a value with the digits that its uncertainty leaves meaningful: two of the uncertainty's.
 pub fn number(value: f64, uncertainty: Option<f64>) -> String {
     let scale = uncertainty.filter(|it| it.is_finite() && *it > 0.0);
     let leading = scale.unwrap_or(value.abs().max(1e-9) * 0.01).log10().floor();
@@ -94,7 +94,7 @@ pub fn percent(share: f64, interval: Option<[f64; 2]>) -> String {
     if is_zero { digits.into() } else { text.replacen('-', "−", 1) }
 }
 
-/// Words joined by commas and a last "and".
+/// Returns the words joined by commas and a last "and".
 pub fn joined(words: &[String]) -> String {
     match words {
         [] => String::new(),
@@ -103,8 +103,8 @@ pub fn joined(words: &[String]) -> String {
     }
 }
 
-/// A number of an effect with its meaning, unit and 95 % interval of a half width; `None` for a convention, which
-/// has no interval. Behind its name and a space may stand the run that it is of.
+/// Returns a number of an effect with its meaning, unit and 95 % interval of a half width; `None` for a convention,
+/// which has no interval. Behind its name and a space may stand the run that it is of.
 pub fn figure(name: &str, value: f64, half: f64) -> Option<String> {
     let (name, run) = name.split_once(' ').unwrap_or((name, ""));
     let (words, unit) = parameter(name);
@@ -121,7 +121,7 @@ pub fn figure(name: &str, value: f64, half: f64) -> Option<String> {
     })
 }
 
-/// A wheel's wrong diameter by what the speed reads, with its 95 % interval.
+/// Returns a wheel's wrong diameter by what the speed reads, with its 95 % interval.
 fn speed_error(scale: f64, half: f64) -> String {
     let side = if scale > 1.0 { "high" } else { "low" };
     let percent =

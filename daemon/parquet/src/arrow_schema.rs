@@ -1,5 +1,5 @@
-//! Arrow's schema of a table, which programs that use Arrow leave in a Parquet file, and which says what Parquet cannot:
-//! that numbers are times, and units and meanings of columns.
+//! Arrow's schema of a table, which programs that use Arrow leave in a Parquet file. It states facts that Parquet
+//! cannot: that numbers are times, and units and meanings of columns.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -55,7 +55,7 @@ mod parts {
     pub const METADATA: u16 = 6;
 }
 
-/// The hint of each column in a file's metadata, in order; none where they hold no schema of Arrow's.
+/// Returns the hint of each column in a file's metadata, in order; none where they hold no schema of Arrow's.
 pub fn hints(said: &[KeyValue]) -> Vec<Hint> {
     let encoded = said.iter().find(|it| it.key == KEY).and_then(|it| it.value.as_deref());
     let bytes = encoded.and_then(|it| STANDARD.decode(it).ok()).unwrap_or_default();
@@ -102,12 +102,12 @@ impl Buffer<'_> {
         Some(u32::from_le_bytes(*self.0.get(at..)?.first_chunk()?))
     }
 
-    /// Where the reference at a place leads.
+    /// Returns where the reference at a place leads.
     fn follow(&self, at: usize) -> Option<usize> {
         at.checked_add(self.u32(at)? as usize)
     }
 
-    /// Where a part of a table lies; `None` where it is left out.
+    /// Returns where a part of a table lies; `None` where it is left out.
     fn part(&self, table: usize, number: u16) -> Option<usize> {
         let back = self.u32(table)?.cast_signed() as isize;
         let places = table.checked_add_signed(back.checked_neg()?)?;
@@ -124,7 +124,7 @@ type Table = WIPOffset<UnionWIPOffset>;
 /// Tables that are written.
 type Tables = WIPOffset<Vector<'static, ForwardsUOffset<UnionWIPOffset>>>;
 
-/// The schema of a table of ours, each column with its unit, its meaning and the names of its numbers.
+/// Returns the schema of a table of ours, each column with its unit, its meaning and the names of its numbers.
 pub fn encoded(columns: &[RecordingColumn]) -> KeyValue {
     let mut bytes = FlatBufferBuilder::new();
     let fields: Vec<Table> = columns.iter().map(|it| field(&mut bytes, it)).collect();

@@ -60,7 +60,7 @@ impl ColumnType {
         ColumnType::new(CellKind::Time { per_second }, format!("{name}({unit}{zone})"))
     }
 
-    /// The type of a field of a file's schema; `hint` is that of Arrow's schema.
+    /// Returns the type of a field of a file's schema; `hint` is that of Arrow's schema.
     pub fn of(field: &Type, hint: Option<Hint>) -> Self {
         let info = field.get_basic_info();
         let is_repeated =
@@ -90,7 +90,7 @@ fn nested(field: &Type) -> String {
     format!("{}({})", if is_map { "Map" } else { "Struct" }, fields.join(", "))
 }
 
-/// True for a list of entries.
+/// Returns true for a list of entries.
 pub fn is_list(field: &Type) -> bool {
     let info = field.get_basic_info();
     field.is_group()
@@ -98,7 +98,7 @@ pub fn is_list(field: &Type) -> bool {
             || info.converted_type() == ConvertedType::LIST)
 }
 
-/// The type of a primitive field.
+/// Returns the type of a primitive field.
 fn plain(field: &Type, hint: Option<Hint>) -> ColumnType {
     use PhysicalType::{
         BOOLEAN, BYTE_ARRAY, DOUBLE, FIXED_LEN_BYTE_ARRAY, FLOAT, INT32, INT64, INT96,
@@ -164,7 +164,7 @@ fn per_second(unit: TimeUnit) -> u64 {
     }
 }
 
-/// The logical type of files from before there were some.
+/// Returns the logical type of files from before there were some.
 fn said_before(field: &Type) -> Option<LogicalType> {
     let integer = |bits, is_signed| LogicalType::integer(bits, is_signed);
     Some(match field.get_basic_info().converted_type() {

@@ -1,5 +1,5 @@
-//! A Parquet file of anybody as columns of numbers: all its columns by name, what the wanted ones hold, and whose the
-//! rows are.
+//! A Parquet file of any program as columns of numbers: all its columns by name, the contents of the wanted ones, and
+//! the train of each row.
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -17,9 +17,9 @@ use crate::column_type::CellKind;
 use crate::error::{TableProblem, guarded};
 use crate::file::{ColumnReader, FileColumn, ParquetFile, damaged};
 
-/// All columns of a Parquet file, with the numbers in the mapped ones: what is missing is `NaN`, true is 1 and false 0.
-/// Where a mapped column is not there, none has numbers. Beside them come the trains, where a column says whose the rows
-/// are.
+/// Returns all columns of a Parquet file, with the numbers in the mapped ones: what is missing is `NaN`, true is 1 and
+/// false 0. Where a mapped column is not there, none has numbers. Beside them come the trains, where a column says
+/// whose the rows are.
 ///
 /// # Errors
 ///
@@ -32,7 +32,7 @@ pub fn columns_of(
     guarded(|| read(&ParquetFile::open(File::open(path)?)?, mappings, train_rows))
 }
 
-/// The same of a file's bytes.
+/// Returns the same of a file's bytes.
 ///
 /// # Errors
 ///
@@ -88,7 +88,7 @@ fn require_numbers(column: &FileColumn, unit: &Unit) -> Result<(), TableProblem>
     }
 }
 
-/// A column's numbers.
+/// Returns a column's numbers.
 fn numbers(file: &ParquetFile, column: &FileColumn, unit: &Unit) -> Result<Vec<f64>, TableProblem> {
     let mut values = Vec::new();
     // Bytes that do not fit now are asked for again as they come.
@@ -133,7 +133,7 @@ fn numbers(file: &ParquetFile, column: &FileColumn, unit: &Unit) -> Result<Vec<f
     Ok(values)
 }
 
-/// The number whose shortest text this is.
+/// Returns the number whose shortest text this is.
 fn as_written(number: impl Display) -> f64 {
     number.to_string().parse().unwrap_or(f64::NAN)
 }
@@ -142,7 +142,7 @@ fn decimal(count: impl Display, scale: i32) -> f64 {
     as_written(format_args!("{count}e{}", -i64::from(scale)))
 }
 
-/// The digits of a whole number of any size, whose first byte is the highest and bears the sign.
+/// Returns the digits of a whole number of any size, whose first byte is the highest and bears the sign.
 fn digits(bytes: &[u8]) -> String {
     let is_negative = bytes.first().is_some_and(|it| *it >= 128);
     let mut left: Vec<u8> = bytes.to_vec();
@@ -165,7 +165,7 @@ fn digits(bytes: &[u8]) -> String {
     sign.chars().chain(digits.into_iter().rev()).collect()
 }
 
-/// The number in floating point of 16 bits.
+/// Returns the number in floating point of 16 bits.
 fn half(bits: u16) -> f32 {
     let (exponent, fraction) = (i32::from(bits >> 10 & 31), f32::from(bits & 1023));
     let size = match exponent {
@@ -177,7 +177,7 @@ fn half(bits: u16) -> f32 {
     if bits >> 15 == 0 { size } else { -size }
 }
 
-/// A time in s; by its text it is the nearest number.
+/// Returns a time in s; by its text it is the nearest number.
 fn time_s(count: i64, per_second: u64) -> f64 {
     let (sign, count) = (if count < 0 { "-" } else { "" }, count.unsigned_abs());
     let (whole, part) = (count / per_second, count % per_second);

@@ -83,12 +83,12 @@ impl ParquetFile {
         Ok(ParquetFile { reader: Box::new(reader), columns })
     }
 
-    /// Its metadata.
+    /// Returns its metadata.
     pub fn key_values(&self) -> &[KeyValue] {
         self.reader.metadata().file_metadata().key_value_metadata().map_or(&[], |it| it)
     }
 
-    /// The number of its rows for which room may be made.
+    /// Returns the number of its rows for which room may be made.
     pub fn rows_reserved(&self) -> usize {
         let rows = self.reader.metadata().file_metadata().num_rows();
         rows.try_into().unwrap_or(0).min(ROWS_RESERVED_MAX)
@@ -115,7 +115,7 @@ impl ParquetFile {
     }
 }
 
-/// The entries of a field that holds lists of plain values.
+/// Returns the entries of a field that holds lists of plain values.
 fn entry_of(field: &Type) -> Option<&Type> {
     let entries = if is_list(field) { only_field(field)? } else { return None };
     only_field(entries).filter(|it| it.is_primitive())
@@ -204,13 +204,13 @@ impl CellLayout {
     }
 }
 
-/// The error of a file that holds something else than it says.
+/// Returns the error of a file that holds something else than it says.
 pub fn damaged(found: &str) -> TableProblem {
     TableProblem::NotParquet(format!("damaged: {found}"))
 }
 
 impl FileColumn {
-    /// The words of what was found where another type was expected.
+    /// Returns the words of what was found where another type was expected.
     pub fn refused(&self, expected: impl Into<String>) -> TableProblem {
         TableProblem::OtherType {
             column: self.name.clone(),
@@ -219,7 +219,7 @@ impl FileColumn {
         }
     }
 
-    /// True where its values are of a kind.
+    /// Returns whether its values are of a kind.
     pub fn is(&self, kind: CellKind) -> bool {
         self.column_type.kind == kind
     }

@@ -6,11 +6,11 @@
 //!
 //! # Layout
 //!
-//! - [`arrow_schema`]: what Arrow's schema, beside Parquet's, says of a table
+//! - [`arrow_schema`]: Arrow's schema of a table, beside Parquet's
 //! - [`error`]: why a file cannot be read, and how a damaged file affects its library
 //! - [`column_type`], [`file`](mod@file): types of the columns of a file, and their cells
 //! - [`columns`]: a Parquet file of anybody as columns of numbers, and whose its rows are
-//! - [`reading`]: Parquet to what a recording holds, and to MCAP
+//! - [`reading`]: Parquet to the messages of a recording, and to MCAP
 //! - [`table_file`], [`writing`]: the tables of a recording, after `dynocar_mcap::columns`; MCAP to Parquet
 
 pub mod arrow_schema;

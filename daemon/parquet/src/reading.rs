@@ -66,7 +66,7 @@ pub fn read(path: &Path) -> Result<ParquetContent, ParquetFileError> {
     Ok(content)
 }
 
-/// The Parquet files of a recording.
+/// Returns the Parquet files of a recording.
 fn files(path: &Path) -> Result<Vec<PathBuf>, ParquetFileError> {
     let listed = || {
         if !std::fs::metadata(path)?.is_dir() {
@@ -175,7 +175,7 @@ fn text(bytes: &ByteArray) -> String {
     String::from_utf8_lossy(bytes.data()).into_owned()
 }
 
-/// A file's column, which is refused where it is not there or of another type.
+/// Returns a file's column, which is refused where it is not there or of another type.
 fn of_file<'f>(
     file: &'f ParquetFile,
     expected: &RecordingColumn,
@@ -259,7 +259,7 @@ fn each_cell(
     }
 }
 
-/// The cells of a column, made something else.
+/// Returns the cells of a column, made something else.
 fn cells_of<T>(
     file: &ParquetFile,
     column: &RecordingColumn,
@@ -286,7 +286,7 @@ fn bytes_of(
 }
 
 impl ParquetContent {
-    /// The same as a recording in memory.
+    /// Returns the same as a recording in memory.
     pub fn into_recording(self) -> Recording {
         let mut recording = Recording { metadata: self.metadata, ..Recording::default() };
         recording.attachments = self.attached.into_iter().map(|it| (it.0, it.2)).collect();

@@ -150,8 +150,8 @@ fn put<T: DataType>(
     writer.close()
 }
 
-/// Numbers by their differences or by their bytes: dictionaries take numbers for the same that are equal but
-/// not the same to the bit.
+/// Returns the numbers by their differences or by their bytes: dictionaries take numbers for the same that are equal
+/// but not the same to the bit.
 fn properties(columns: &[RecordingColumn], said: Vec<KeyValue>) -> WriterProperties {
     let mut builder = WriterProperties::builder()
         .set_key_value_metadata(Some(said))
@@ -215,7 +215,7 @@ pub static TABLES: [TableKind; 3] = [
     },
 ];
 
-/// A column's type in its file.
+/// Returns a column's type in its file.
 fn parquet_type(column: &RecordingColumn) -> Result<Type, ParquetError> {
     let repetition = if column.is_nullable { Repetition::OPTIONAL } else { Repetition::REQUIRED };
     let name = if column.list.is_some() { ENTRY } else { &column.name };
@@ -246,13 +246,13 @@ fn parquet_type(column: &RecordingColumn) -> Result<Type, ParquetError> {
     list.with_logical_type(Some(LogicalType::List)).build()
 }
 
-/// The bits of a column's whole numbers, and whether they have a sign.
+/// Returns the bits of a column's whole numbers, and whether they have a sign.
 pub fn integer(column: &RecordingColumn) -> (i8, bool) {
     let (sign, bits) = column.type_name.split_at(1);
     (bits.parse().unwrap_or(64), sign == "i")
 }
 
-/// The columns of attached files.
+/// Returns the columns of attached files.
 pub fn attachment_columns() -> [RecordingColumn; 3] {
     [
         RecordingColumn::beside("name", "string", false),
@@ -261,7 +261,7 @@ pub fn attachment_columns() -> [RecordingColumn; 3] {
     ]
 }
 
-/// The columns of metadata: a row for each pair, and one without a key for a record that has none.
+/// Returns the columns of metadata: a row for each pair, and one without a key for a record that has none.
 pub fn metadata_columns() -> [RecordingColumn; 4] {
     [
         RecordingColumn::beside("record", "u64", false),
@@ -271,7 +271,7 @@ pub fn metadata_columns() -> [RecordingColumn; 4] {
     ]
 }
 
-/// The schema of a table's file.
+/// Returns the schema of a table's file.
 ///
 /// # Errors
 ///

@@ -52,7 +52,7 @@ struct RecoverArguments {
 /// The exit status where something of a recording is lost.
 const LOST: u8 = 3;
 
-/// The command line of the recording's commands.
+/// Returns the command line of the recording's commands.
 pub fn command() -> clap::Command {
     Arguments::command()
 }

@@ -1,8 +1,8 @@
-//! The recorder of what a controller and the daemon write.
+//! The recorder of samples and snapshots.
 //!
 //! # Layout
 //!
-//! - [`train_channels`]: what a recorder and a live view read of the trains' channels
+//! - [`train_channels`]: reader of the trains' channels for a recorder and a live view
 //! - [`record`]: the recorder
 //! - [`page`]: the reference page of the recorded fields
 //! - [`cli`]: the command line

@@ -33,7 +33,7 @@ const EXPLANATION: &str = "
 `explain --annotate` adds these messages, without Parquet.
 ";
 
-/// The page as Markdown.
+/// Returns the page as Markdown.
 pub fn page() -> String {
     let mut page = HEAD.to_owned();
     layout(&mut page, "dynocar.TrainSample", "One cycle of a train.", (&SAMPLE_FIELDS, &SAMPLES));
@@ -125,7 +125,7 @@ impl<'a> Row<'a> {
     }
 }
 
-/// A line of documentation without its links.
+/// Returns a line of documentation without its links.
 fn plain(meaning: &str) -> String {
     meaning
         .trim()
@@ -135,7 +135,7 @@ fn plain(meaning: &str) -> String {
         .replace("`]", "`")
 }
 
-/// The vocabulary, or else protobuf's name of a Rust type.
+/// Returns the vocabulary, or else protobuf's name of a Rust type.
 fn type_of(vocabulary: Option<&str>, type_name: &str) -> String {
     let scalar = || scalar(type_name).as_str_name().trim_start_matches("TYPE_").to_lowercase();
     vocabulary.map_or_else(scalar, str::to_owned)

@@ -55,7 +55,7 @@ impl TrainChannels {
         Ok(channels)
     }
 
-    /// The trains that are read by now.
+    /// Returns the trains that are read by now.
     pub fn trains(&self) -> impl Iterator<Item = TrainId> {
         self.channels.iter().map(TrainChannel::train)
     }
@@ -176,7 +176,7 @@ impl TrainChannel {
         })
     }
 
-    /// The train.
+    /// Returns the train.
     pub fn train(&self) -> TrainId {
         self.observed.id
     }

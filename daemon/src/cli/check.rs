@@ -1,4 +1,4 @@
-//! `dynocar check` of a daemon's configuration; what else can be checked, the workshop checks.
+//! `dynocar check` of a daemon's configuration; the workshop checks all other files.
 
 mod daemon;
 
@@ -92,7 +92,7 @@ pub fn refusal(path: &Path, error: ErrorAnswer) -> CheckAnswer<()> {
     }
 }
 
-/// A result, or its failure once machines know it.
+/// Returns a result, or its failure once machines know it.
 ///
 /// # Errors
 ///
@@ -124,7 +124,7 @@ fn understood<'a>(path: &Path, config: &'a DaemonConfig) -> CheckAnswer<Content<
     }
 }
 
-/// True for a configuration, by its tables; a TOML file that cannot be read is refused here.
+/// Returns true for a configuration, by its tables; a TOML file that cannot be read is refused here.
 fn may_be_configuration(path: &Path) -> Result<bool, Failure> {
     let is_toml = path.extension().is_some_and(|extension| extension == "toml");
     if !is_toml || !path.is_file() {

@@ -1,4 +1,4 @@
-//! Why a command ends without its result: the words, the place and the exit status.
+//! Failures of a command: the words, the place and the exit status.
 
 use std::fmt::Display;
 use std::path::Path;
@@ -32,12 +32,12 @@ impl Failure {
         Failure::Work(error.to_string())
     }
 
-    /// A wrong input, by what is wrong with it.
+    /// Returns a wrong input, by what is wrong with it.
     pub fn input(error: impl Display) -> Self {
         Failure::Input(error.to_string())
     }
 
-    /// The failure for machines; `None` when the result is reported already.
+    /// Returns the failure for machines; `None` when the result is reported already.
     pub fn answer(&self) -> Option<ErrorAnswer> {
         let (message, position, exit_status) = match self {
             Failure::Input(message) => (message.clone(), None, 2),

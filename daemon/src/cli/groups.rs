@@ -1,4 +1,4 @@
-//! The commands of `dynocar --help`, in groups by what they are for.
+//! The commands of `dynocar --help`, in groups by their purpose.
 
 use std::fmt::Write;
 
@@ -16,7 +16,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("Connect, with other programs", &["live", "fmu", "completions", "man"]),
 ];
 
-/// The program's command line with a help that lists its commands in groups.
+/// Returns the program's command line with a help that lists its commands in groups.
 pub fn grouped(command: Command) -> Command {
     let list = list(&command);
     command.help_template(format!(
@@ -25,7 +25,7 @@ pub fn grouped(command: Command) -> Command {
     ))
 }
 
-/// The commands that there are, each with its first sentence, below the headings.
+/// Returns the commands that there are, each with its first sentence, below the headings.
 fn list(command: &Command) -> String {
     let names = || command.get_subcommands().map(Command::get_name);
     let width = names().map(str::len).max().unwrap_or_default();

@@ -115,7 +115,7 @@ impl Command {
         }
     }
 
-    /// Where machines want the result; `check` has an answer of its own for what is wrong.
+    /// Returns where machines want the result; `check` has an answer of its own for what is wrong.
     fn json(&self) -> Option<&Path> {
         match self {
             Command::Demo(arguments) => arguments.json.as_deref(),
@@ -124,7 +124,7 @@ impl Command {
     }
 }
 
-/// All commands, with the options of those that this program carries out itself.
+/// Returns all commands, with the options of those that this program carries out itself.
 pub fn commands() -> clap::Command {
     groups::grouped(Arguments::command())
 }
@@ -156,7 +156,7 @@ pub fn carry_out<A: Parser>(
     }
 }
 
-/// The command line of a program of the project; where it asks for help or is wrong, the exit
+/// Returns the command line of a program of the project; where it asks for help or is wrong, the exit
 /// status after that was reported.
 ///
 /// # Errors
@@ -166,7 +166,7 @@ pub fn parse<A: Parser>(program: &str) -> Result<A, ExitCode> {
     parse_by(A::command(), program, std::env::args_os().collect())
 }
 
-/// The command line, `help COMMAND` as `COMMAND --help`: so that another program's command answers too.
+/// Returns the command line, `help COMMAND` as `COMMAND --help`: so that another program's command answers too.
 fn help_of_command() -> Vec<OsString> {
     let mut words: Vec<OsString> = std::env::args_os().collect();
     if words.len() == 3 && words[1] == "help" && words[2] != "help" {

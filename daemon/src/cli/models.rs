@@ -1,4 +1,4 @@
-//! `dynocar models`: the store of models, and what is decided on them.
+//! `dynocar models`: the store of models, and decisions on them.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -128,7 +128,7 @@ fn failure(error: ModelsError) -> Failure {
     }
 }
 
-/// The store that is named, else that of the configuration; `models` where there is none.
+/// Returns the store that is named, else that of the configuration; `models` where there is none.
 ///
 /// # Errors
 ///
@@ -144,7 +144,7 @@ pub fn store(named: Option<&Path>, config: Option<&DaemonConfig>) -> Result<Stor
     }
 }
 
-/// The models of the train that is meant.
+/// Returns the models of the train that is meant.
 fn chosen(arguments: &ModelsArguments) -> Result<TrainModels, Failure> {
     let config = arguments.config.as_deref().map(DaemonConfig::load).transpose()?;
     let store = store(arguments.models.as_deref(), config.as_ref())?;
@@ -164,7 +164,7 @@ fn chosen(arguments: &ModelsArguments) -> Result<TrainModels, Failure> {
     Ok(store.train(train))
 }
 
-/// The model that a name means.
+/// Returns the model that a name means.
 fn found<'h>(history: &'h ModelHistory, name: &str) -> Result<&'h (Stored, State), Failure> {
     let is_meant = |(stored, _): &&(Stored, State)| match name {
         "in-force" => history.in_force == Some(stored.hash),
@@ -280,7 +280,7 @@ fn trial(trials: &TrialRecord, hash: ModelHash) -> String {
     text
 }
 
-/// A model's error over that of the one in force, with what speaks for it.
+/// Returns a model's error over that of the one in force, with what speaks for it.
 fn compared(tried: &TriedModel) -> String {
     let (trips, e_value) = (tried.evidence.trips(), tried.evidence.e_value());
     let evidence = if e_value < 1e4 { short(e_value, 1) } else { format!("{e_value:.0e}") };

@@ -66,7 +66,7 @@ pub fn execute_or_become(arguments: &ReplayArguments) -> Result<(), Failure> {
     execute(arguments, |source| dataset::load(source))
 }
 
-/// True for a recording, and for a dataset with runs in Parquet.
+/// Returns true for a recording, and for a dataset with runs in Parquet.
 fn needs_workshop(path: &Path) -> bool {
     let is_recording = path.extension().is_some_and(|it| it == "mcap") || is_parquet_path(path);
     let has_parquet = |head: &DatasetHead| head.manifest.runs.iter().any(|it| is_parquet(&it.file));

@@ -14,7 +14,7 @@ pub struct TextTable {
 }
 
 impl TextTable {
-    /// A table with a header; `left` are the columns of words.
+    /// Returns a table with a header; `left` are the columns of words.
     pub fn new(header: &[&str], left: &[usize]) -> Self {
         let header = header.iter().map(|&name| name.into()).collect();
         TextTable { rows: vec![header], left: left.into() }
@@ -77,7 +77,7 @@ pub fn short(value: f64, decimals: usize) -> String {
     if text == "-0" { "0".into() } else { text.into() }
 }
 
-/// An entry: a key and what is said of it, broken into lines.
+/// Returns an entry: a key and what is said of it, broken into lines.
 pub fn line(key: &str, value: &str) -> String {
     let mut lines = wrap(value, WIDTH - KEY_WIDTH).into_iter();
     let first = lines.next().unwrap_or_default();
@@ -85,7 +85,7 @@ pub fn line(key: &str, value: &str) -> String {
     format!("  {key:KEY_WIDTH$}{first}\n{}", rest.collect::<String>())
 }
 
-/// A sentence that begins with its subject, the lines after the first further in.
+/// Returns a sentence that begins with its subject, the lines after the first further in.
 pub fn entry(indent: &str, words: &str) -> String {
     let lines = wrap(words, WIDTH - indent.len());
     format!("{indent}{}\n", lines.join(&format!("\n{indent}  ")))

@@ -1,4 +1,4 @@
-//! Which estimators now and then compute for long, and the lines that give others a thread of their own.
+//! Estimators that now and then compute for long, and the configuration lines that give others a thread of their own.
 
 use dynocar_shared::PipelineKind;
 
@@ -38,7 +38,7 @@ pub fn names_one(name: &str) -> String {
     format!("the name of a [[threads]] table; these lines make one:\n\n[[threads]]\nname = {name}")
 }
 
-/// The lines that give the slow pipelines of a thread one of their own: one that has only such, else a new
+/// Returns the lines that give the slow pipelines of a thread one of their own: one that has only such, else a new
 /// one.
 fn own_thread(shared: &str, pipelines: &[PipelineConfig], threads: &[ThreadConfig]) -> String {
     let is_slow = |pipeline: &PipelineConfig| is_slow(pipeline.estimator.kind());
@@ -73,7 +73,7 @@ fn own_thread(shared: &str, pipelines: &[PipelineConfig], threads: &[ThreadConfi
     lines + &moved.collect::<Vec<_>>().join("\n\n")
 }
 
-/// True for an estimator whose step may take longer than a fast pipeline may be held up: one that
+/// Returns true for an estimator whose step may take longer than a fast pipeline may be held up: one that
 /// iterates over a whole window or segment. It never shares a thread with a fast one.
 pub const fn is_slow(kind: PipelineKind) -> bool {
     matches!(

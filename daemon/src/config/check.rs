@@ -1,4 +1,4 @@
-//! From the text of a configuration to a checked [`DaemonConfig`].
+//! Checks the text of a configuration and makes a [`DaemonConfig`] of it.
 
 use std::collections::HashSet;
 use std::net::SocketAddr;

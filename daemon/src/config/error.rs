@@ -1,4 +1,4 @@
-//! How a configuration refuses a value, and why it is refused.
+//! Refusals of a value by a configuration, with reasons.
 
 use std::path::{Path, PathBuf};
 

@@ -105,7 +105,7 @@ impl Default for StateConfig {
     }
 }
 
-/// How often what outlives the daemon is written, in s.
+/// Returns how often what outlives the daemon is written, in s.
 pub(super) const fn default_interval_s() -> u64 {
     30
 }

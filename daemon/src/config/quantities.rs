@@ -1,4 +1,4 @@
-//! Which pipeline answers which of a controller's questions, for each train.
+//! The pipeline that answers each of a controller's questions, for each train.
 
 use dynocar_core::pipeline::quantities::candidates;
 use dynocar_shared::{Quantity, TrainId};
@@ -61,7 +61,7 @@ impl Answers {
         Ok(answers)
     }
 
-    /// The number of the pipeline that answers a quantity.
+    /// Returns the number of the pipeline that answers a quantity.
     pub const fn pipeline_index(&self, quantity: Quantity) -> Option<usize> {
         self.pipeline_indices[quantity as usize]
     }

@@ -114,7 +114,7 @@ fn await_fresh(reader: &mut SnapshotReader, stage: &mut Stage) -> Result<(), Dem
     }
 }
 
-/// The recorded sample period at this rate, but at least 100 µs.
+/// Returns the recorded sample period at this rate, but at least 100 µs.
 fn control_cycle(dataset: &Dataset, rate: f64) -> Duration {
     let samples = &dataset.runs[0].samples;
     let recorded_ns = match &samples[..] {

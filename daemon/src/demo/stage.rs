@@ -69,12 +69,12 @@ impl Stage {
         Ok(Stage { folder, dataset, host, daemon: None, controller: None })
     }
 
-    /// The dataset's folder.
+    /// Returns the dataset's folder.
     pub fn dataset(&self) -> &Path {
         &self.dataset
     }
 
-    /// The run-time directory.
+    /// Returns the run-time directory.
     pub fn host(&self) -> &Host {
         &self.host
     }
@@ -140,7 +140,7 @@ impl Stage {
         status.map_or(Ok(()), |status| Err(self.ended("daemon", status)))
     }
 
-    /// True when the controller has published everything.
+    /// Returns whether the controller has published everything.
     ///
     /// # Errors
     ///

@@ -77,7 +77,7 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// The result for machines.
+    /// Returns the result for machines.
     pub fn answer(&self) -> DemoAnswer {
         let pipelines: Vec<PipelineAnswer> = self.snapshots.iter().map(pipeline_answer).collect();
         let worst = |of: fn(&PipelineAnswer) -> u64| pipelines.iter().map(of);
@@ -95,7 +95,7 @@ impl Summary {
         DemoAnswer { pipelines, samples, latency }
     }
 
-    /// The result for people.
+    /// Returns the result for people.
     pub fn text(&self) -> String {
         let answer = self.answer();
         let mut text = format!(
@@ -221,7 +221,7 @@ impl Latencies {
         }
     }
 
-    /// The least time in ns within which this share of the snapshots came; 0 without any.
+    /// Returns the least time in ns within which this share of the snapshots came; 0 without any.
     pub fn quantile_ns(&self, share: f64) -> u64 {
         let mut sorted = self.taken_ns.clone();
         sorted.sort_unstable();
@@ -229,7 +229,7 @@ impl Latencies {
         sorted.get(rank.saturating_sub(1)).copied().unwrap_or(0)
     }
 
-    /// How many snapshots were measured.
+    /// Returns how many snapshots were measured.
     pub fn count(&self) -> u64 {
         self.taken_ns.len() as u64
     }

@@ -59,7 +59,7 @@ impl DemoView {
     }
 }
 
-/// A line for each pipeline, and one for the samples.
+/// Returns a line for each pipeline, and one for the samples.
 fn lines(reader: &SnapshotReader, now_ns: i64, total: u64) -> Vec<String> {
     let done = reader.readings(now_ns).map(|it| it.snapshot.sample_sequence).max().unwrap_or(0);
     let bar = bar(done as f64 / total.max(1) as f64, BAR_LETTERS);

@@ -1,4 +1,4 @@
-//! Who put which model in force, who took it back, and the state of each model of a train that follows from that.
+//! Decisions that put a model in force or take it back, and the state of each model of a train that follows from them.
 
 use dynocar_model::named;
 use serde::{Deserialize, Serialize};
@@ -67,7 +67,7 @@ pub enum ModelChoice {
     Reject(ModelHash),
 }
 
-/// The models in force after some decisions, the present one last, each on top of what it replaced;
+/// Returns the models in force after some decisions, the present one last, each on top of what it replaced;
 /// empty while nothing but the configuration's declaration is in force.
 pub fn in_force_after<'d>(decisions: impl IntoIterator<Item = &'d Decision>) -> Vec<ModelHash> {
     let mut stack = Vec::new();

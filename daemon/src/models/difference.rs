@@ -36,7 +36,7 @@ pub struct KeyDifference {
     pub values: [String; 2],
 }
 
-/// The keys in which two models differ, by file and key.
+/// Returns the keys in which two models differ, by file and key.
 pub fn differences(one: &ModelText, other: &ModelText) -> Vec<KeyDifference> {
     let mut all = of_file(TRAIN_FILE, [Some(&one.train), Some(&other.train)]);
     all.extend(of_file(TRACK_FILE, [one.track.as_ref(), other.track.as_ref()]));

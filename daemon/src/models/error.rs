@@ -1,4 +1,4 @@
-//! Why the store of models does not give or take something.
+//! Errors of the store of models.
 
 use std::path::PathBuf;
 

@@ -3,9 +3,9 @@
 //! ```text
 //! models/1/3f0c5a…/train.toml, track.toml   a model of train 1; the folder's name is the model's hash
 //! models/1/3f0c5a…/origin.toml              where it came from
-//! models/1/3f0c5a…/answer.json, report.html what `explain` said; absent for a declared model
-//! models/1/decisions/000001.toml …          who put what in force, and who took it back
-//! models/1/events/000001.toml …             what belongs to certain runs: maintenance events
+//! models/1/3f0c5a…/answer.json, report.html the answer of `explain`; absent for a declared model
+//! models/1/decisions/000001.toml …          who put which model in force, and who took it back
+//! models/1/events/000001.toml …             maintenance events of certain runs
 //! ```
 //!
 //! Whatever dies, a process or the power: a model is there as a whole or not at all, and two writers

@@ -22,22 +22,22 @@ pub struct UtcSecond {
 pub struct NoMoment(String);
 
 impl UtcSecond {
-    /// The second in which an instant lies; the first of 1970 for one before.
+    /// Returns the second in which an instant lies; the first of 1970 for one before.
     pub fn of(instant: SystemTime) -> Self {
         UtcSecond { unix_s: instant.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs()) }
     }
 
-    /// Its beginning.
+    /// Returns its beginning.
     pub fn instant(self) -> SystemTime {
         UNIX_EPOCH + Duration::from_secs(self.unix_s)
     }
 
-    /// Its day, as year-month-day.
+    /// Returns its day, as year-month-day.
     pub fn day(self) -> String {
         self.in_calendar().date().to_string()
     }
 
-    /// The end of the year 9999 for what is later: a clock that is wrong is no fault of ours.
+    /// Returns the end of the year 9999 for what is later: a clock that is wrong is no fault of ours.
     fn in_calendar(self) -> OffsetDateTime {
         let unix_s = i64::try_from(self.unix_s).unwrap_or(i64::MAX);
         let last = PrimitiveDateTime::MAX.assume_utc();

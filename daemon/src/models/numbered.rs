@@ -14,7 +14,7 @@ use crate::storage::{Storage, part_of, write_once};
 /// A record with its number.
 pub type Numbered<T> = (u64, T);
 
-/// The names in a folder, sorted; none for a folder that is not there.
+/// Returns the names in a folder, sorted; none for a folder that is not there.
 pub(super) fn names_in(folder: &Path) -> Result<Vec<String>, ModelsError> {
     let failed = |error: std::io::Error| ModelsError::Unreadable {
         path: folder.into(),
@@ -32,7 +32,7 @@ pub(super) fn names_in(folder: &Path) -> Result<Vec<String>, ModelsError> {
     Ok(names)
 }
 
-/// The text of a file of the store.
+/// Returns the text of a file of the store.
 pub(super) fn text_of(path: &Path) -> Result<String, ModelsError> {
     read_text(path).map_err(|problem| ModelsError::Unreadable { path: path.into(), problem })
 }
@@ -45,7 +45,7 @@ pub(super) fn read_record<T: DeserializeOwned>(path: &Path) -> Result<T, ModelsE
     })
 }
 
-/// All records of a folder, by their numbers.
+/// Returns all records of a folder, by their numbers.
 ///
 /// # Errors
 ///
@@ -83,7 +83,7 @@ pub fn write<T: Serialize>(
     }
 }
 
-/// Where the record of a number lies.
+/// Returns where the record of a number lies.
 pub fn path_of(folder: &Path, number: u64) -> PathBuf {
     folder.join(format!("{number:06}.toml"))
 }

@@ -19,22 +19,22 @@ pub struct ModelFigure {
 }
 
 impl ModelFigure {
-    /// Half the width of the 95 % interval.
+    /// Returns the half the width of the 95 % interval.
     pub fn half_width(self) -> f64 {
         HALF_95 * self.std
     }
 
-    /// True where the 95 % intervals of both overlap.
+    /// Returns whether the 95 % intervals of both overlap.
     pub fn agrees_with(self, other: ModelFigure) -> bool {
         (self.value - other.value).abs() <= self.half_width() + other.half_width()
     }
 
-    /// The number as one of an effect, in words; `None` without an interval.
+    /// Returns the number as one of an effect, in words; `None` without an interval.
     pub fn of_effect(self, name: &str) -> Option<String> {
         words::figure(name, self.value, self.half_width())
     }
 
-    /// The number under its name, with its 95 % interval.
+    /// Returns the number under its name, with its 95 % interval.
     pub fn shown(self, name: &str) -> String {
         let half = self.half_width();
         let decimals = (1.0 - half.abs().max(1e-9).log10().floor()).clamp(0.0, 9.0) as usize;
@@ -56,7 +56,7 @@ pub struct FoundEffect {
 }
 
 impl FoundEffect {
-    /// True for an effect of the same kind, at the same places, whose numbers agree.
+    /// Returns true for an effect of the same kind, at the same places, whose numbers agree.
     pub fn is_same_as(&self, other: &FoundEffect) -> bool {
         let meets = |[from, to]: [f64; 2], others: &[[f64; 2]]| {
             others.iter().any(|other| from <= other[1] && other[0] <= to)
@@ -140,7 +140,7 @@ impl Origin {
         }
     }
 
-    /// True where both models add the same effects, within their intervals.
+    /// Returns whether both models add the same effects, within their intervals.
     pub fn adds_the_same_as(&self, other: &Origin) -> bool {
         let has = |effects: &[FoundEffect], it: &FoundEffect| {
             effects.iter().any(|other| it.is_same_as(other))

@@ -76,22 +76,22 @@ pub struct Listing {
 }
 
 impl Store {
-    /// The store in a directory, which is made with the first model.
+    /// Returns the store in a directory, which is made with the first model.
     pub fn at(directory: &Path) -> Self {
         Store { directory: directory.into() }
     }
 
-    /// Its directory.
+    /// Returns its directory.
     pub fn directory(&self) -> &Path {
         &self.directory
     }
 
-    /// A train's part of it.
+    /// Returns a train's part of it.
     pub fn train(&self, train: TrainId) -> TrainModels {
         TrainModels { train, folder: self.directory.join(train.0.to_string()) }
     }
 
-    /// The trains of which it holds something, by number.
+    /// Returns the trains of which it holds something, by number.
     ///
     /// # Errors
     ///
@@ -107,12 +107,12 @@ impl Store {
 }
 
 impl TrainModels {
-    /// The train.
+    /// Returns the train.
     pub fn train(&self) -> TrainId {
         self.train
     }
 
-    /// Where the train's models lie.
+    /// Returns where the train's models lie.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
@@ -173,7 +173,7 @@ impl TrainModels {
         Ok(listing)
     }
 
-    /// A model with its origin.
+    /// Returns a model with its origin.
     ///
     /// # Errors
     ///
@@ -184,7 +184,7 @@ impl TrainModels {
         Ok(Stored { hash, origin: read_record(&folder.join(ORIGIN_FILE))?, folder })
     }
 
-    /// The files of a model, which are those that were put there.
+    /// Returns the files of a model, which are those that were put there.
     ///
     /// # Errors
     ///
@@ -203,7 +203,7 @@ impl TrainModels {
         if found == hash { Ok(text) } else { Err(ModelsError::Changed { path: folder, found }) }
     }
 
-    /// A model as the daemon uses it.
+    /// Returns a model as the daemon uses it.
     ///
     /// # Errors
     ///
@@ -213,7 +213,7 @@ impl TrainModels {
         Ok(self.text(hash)?.parse(&folder.join(TRAIN_FILE), &folder.join(TRACK_FILE))?)
     }
 
-    /// The decisions, in order.
+    /// Returns the decisions, in order.
     ///
     /// # Errors
     ///
@@ -222,7 +222,7 @@ impl TrainModels {
         numbered::read_all(&self.folder.join(DECISIONS))
     }
 
-    /// The model in force after the last decision; `None` for what the configuration declares.
+    /// Returns the model in force after the last decision; `None` for what the configuration declares.
     ///
     /// # Errors
     ///
@@ -316,7 +316,7 @@ impl TrainModels {
         }
     }
 
-    /// The maintenance events, in the order in which they were found.
+    /// Returns the maintenance events, in the order in which they were found.
     ///
     /// # Errors
     ///

@@ -78,7 +78,7 @@ impl ModelText {
         Ok(ModelText { train: text(train)?, track: track.map(text).transpose()? })
     }
 
-    /// The hash of the model.
+    /// Returns the hash of the model.
     pub fn hash(&self) -> ModelHash {
         let track = self.track.as_deref().unwrap_or_default();
         let digest = Sha256::new()
@@ -89,7 +89,7 @@ impl ModelText {
         ModelHash(digest.iter().take(8).fold(0, |hash, &byte| hash << 8 | u64::from(byte)))
     }
 
-    /// The model, as every reader of such files understands it; the paths name them in messages.
+    /// Returns the model, as every reader of such files understands it; the paths name them in messages.
     ///
     /// # Errors
     ///

@@ -20,7 +20,7 @@ pub struct ObservedSelection {
 }
 
 impl ObservedSelection {
-    /// The trains beside those that are known for which somebody holds one of these roles by now; none where
+    /// Returns the trains beside those that are known for which somebody holds one of these roles by now; none where
     /// trains were named.
     ///
     /// # Errors

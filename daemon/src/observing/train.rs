@@ -33,13 +33,13 @@ pub struct ObservedTrain {
 }
 
 impl ObservedTrain {
-    /// A train whose snapshots are read as soon as a daemon serves it.
+    /// Returns a train whose snapshots are read as soon as a daemon serves it.
     pub fn new(id: TrainId) -> Self {
         let pipelines = [None; PIPELINES_MAX];
         ObservedTrain { id, reader: None, daemon: None, controller: None, pipelines }
     }
 
-    /// A train whose snapshots are read from now on.
+    /// Returns a train whose snapshots are read from now on.
     ///
     /// # Errors
     ///
@@ -49,12 +49,12 @@ impl ObservedTrain {
         Ok(ObservedTrain { reader, ..ObservedTrain::new(id) })
     }
 
-    /// Who served the train at the last look.
+    /// Returns who served the train at the last look.
     pub fn daemon(&self) -> Option<&Announcement> {
         self.daemon.as_ref()
     }
 
-    /// Who drove it.
+    /// Returns who drove it.
     pub fn controller(&self) -> Option<&Announcement> {
         self.controller.as_ref()
     }
@@ -96,7 +96,7 @@ impl ObservedTrain {
         Ok(())
     }
 
-    /// The newest snapshot of every pipeline at a moment of the host's monotonic clock.
+    /// Returns the newest snapshot of every pipeline at a moment of the host's monotonic clock.
     pub fn readings(&self, now_ns: i64) -> impl Iterator<Item = Reading<'_>> {
         self.reader.iter().flat_map(move |reader| reader.readings(now_ns))
     }
@@ -233,7 +233,7 @@ pub struct TrainChange {
 }
 
 impl TrainChange {
-    /// A change without numbers.
+    /// Returns a change without numbers.
     pub fn new(kind: EventKind, text: String) -> Self {
         TrainChange { kind, pipeline: None, status: None, effect: None, text }
     }

@@ -14,7 +14,7 @@ pub fn pipeline_name(index: u32, kind: Option<PipelineKind>) -> String {
     format!("{index}_{}", kind.map_or("unknown", PipelineKind::name))
 }
 
-/// A duration as people say it.
+/// Returns a duration as people say it.
 pub fn duration(seconds: f64) -> String {
     match seconds {
         s if s < 10.0 => format!("{s:.1} s"),
@@ -33,7 +33,7 @@ pub fn refusals(counts: &[u32; REJECTION_REASONS]) -> Vec<(RejectionReason, u32)
     all
 }
 
-/// The same in words: `speed_jump 104, outlier 2`.
+/// Returns the same in words: `speed_jump 104, outlier 2`.
 pub fn refused_words(refused: &[(RejectionReason, u32)]) -> String {
     let words: Vec<_> = refused.iter().map(|(reason, count)| format!("{reason} {count}")).collect();
     words.join(", ")
@@ -70,18 +70,18 @@ impl Suspicion {
         })
     }
 
-    /// The effect's name.
+    /// Returns the effect's name.
     pub fn name(&self) -> &'static str {
         self.effect.map_or("an effect that is unknown here: a newer daemon", EffectKind::name)
     }
 
-    /// The unexplained force with its 95 % interval.
+    /// Returns the unexplained force with its 95 % interval.
     pub fn force(&self) -> String {
         force_words(self.force_n, self.force_std_n)
     }
 }
 
-/// A force in N with its 95 % interval, in kN.
+/// Returns a force in N with its 95 % interval, in kN.
 pub fn force_words(force_n: f64, force_std_n: f64) -> String {
     format!("{:+.2} ± {:.2} kN", 1e-3 * force_n, 1e-3 * HALF_95 * force_std_n)
 }

@@ -66,7 +66,7 @@ impl Exchange {
         Some(self.seats.iter().filter_map(|seat| seat.inbox.pop()).collect())
     }
 
-    /// The old pipelines, by thread, once all threads have changed.
+    /// Returns the old pipelines, by thread, once all threads have changed.
     pub fn come_back(&self) -> Option<Vec<Set>> {
         let are_all = self.seats.iter().all(|seat| !seat.outbox.is_empty());
         are_all.then(|| self.seats.iter().filter_map(|seat| seat.outbox.pop()).collect())

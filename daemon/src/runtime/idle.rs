@@ -16,7 +16,7 @@ pub struct Idler {
 }
 
 impl Idler {
-    /// An idler; `sleeper` is the thread's bed, unless it never sleeps.
+    /// Returns an idler; `sleeper` is the thread's bed, unless it never sleeps.
     pub fn new(
         strategy: IdleStrategy,
         spin_us: u64,

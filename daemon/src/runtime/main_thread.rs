@@ -68,7 +68,7 @@ pub struct RuntimeWatch {
 }
 
 impl RuntimeWatch {
-    /// A watch over the daemon's trains and pipelines.
+    /// Returns a watch over the daemon's trains and pipelines.
     pub fn new(
         host: Host,
         epoch: u64,

@@ -39,7 +39,7 @@ pub struct StatusLog {
 }
 
 impl StatusLog {
-    /// A log in which nothing has been reported.
+    /// Returns a log in which nothing has been reported.
     pub fn new(now: Instant) -> Self {
         StatusLog {
             reported: Vec::new(),

@@ -1,4 +1,4 @@
-//! Reports of a pipeline thread to the main thread, of what no snapshot carries, without either waiting.
+//! Counts that a pipeline thread reports to the main thread beside its snapshots, without waiting on either side.
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -55,7 +55,7 @@ impl Tally {
         self.counters.unsent.fetch_add(1, Relaxed);
     }
 
-    /// The counters now.
+    /// Returns the counters now.
     pub fn read(&self) -> TallyReading {
         TallyReading {
             beats: self.counters.beats.load(Relaxed),
@@ -66,7 +66,7 @@ impl Tally {
     }
 }
 
-/// A detected fault in one word: the input fault's number, and its factor in single precision.
+/// Returns a detected fault in one word: the input fault's number, and its factor in single precision.
 fn packed(detected: Option<DetectedFault>) -> u64 {
     let word = |it: DetectedFault| {
         u64::from(it.fault as u8) << 32 | u64::from((it.factor as f32).to_bits())

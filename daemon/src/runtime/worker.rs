@@ -281,7 +281,7 @@ fn open_channel_of(
     })
 }
 
-/// True when a sample came while the controllers were informed of the sleep; keeps it.
+/// Returns whether a sample came while the controllers were informed of the sleep; keeps it.
 fn look_once_more(channels: &mut [TrainChannel]) -> bool {
     let mut any = false;
     for channel in channels {

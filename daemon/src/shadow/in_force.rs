@@ -1,4 +1,4 @@
-//! Which model a train has when the daemon starts.
+//! The model that a train has when the daemon starts.
 
 use std::sync::Arc;
 use std::time::SystemTime;
@@ -42,7 +42,7 @@ fn settle_train(
     Ok(())
 }
 
-/// Whether a model is another, or grew from it; false where the store does not say.
+/// Returns whether a model is another, or grew from it; false where the store does not say.
 fn grew_from(models: &TrainModels, model: ModelHash, root: ModelHash) -> bool {
     let parent = |hash: &ModelHash| models.stored(*hash).ok()?.origin.parent;
     // No history is so long, unless somebody wrote one that leads in a circle.
@@ -77,7 +77,7 @@ pub fn permitted(models: &TrainModels, rule: &Rule, hash: ModelHash) -> Result<(
     }
 }
 
-/// The train's configuration with another model of the store in place of what is declared.
+/// Returns the train's configuration with another model of the store in place of what is declared.
 ///
 /// # Errors
 ///

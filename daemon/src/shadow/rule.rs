@@ -1,4 +1,4 @@
-//! Which models are on trial, when a rule adopts one or takes it back, and which bounds none may leave.
+//! Rules for models on trial: selection, adoption, return, and the bounds that no model may leave.
 
 use std::collections::BTreeMap;
 
@@ -59,7 +59,7 @@ impl Rule {
     }
 }
 
-/// The number that a train's file holds under `table.key`.
+/// Returns the number that a train's file holds under `table.key`.
 fn number(table: &Table, key: &str) -> Option<f64> {
     let mut parts = key.split('.');
     let first = table.get(parts.next()?)?;
@@ -78,7 +78,7 @@ pub struct ModelStanding {
     pub rivals: Vec<ModelHash>,
 }
 
-/// Where a train's models stand; `declared` is what the configuration declares. At most
+/// Returns where a train's models stand; `declared` is what the configuration declares. At most
 /// `candidates_max` candidates are on trial: those that the configuration names, else the newest.
 ///
 /// # Errors

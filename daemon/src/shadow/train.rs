@@ -97,12 +97,12 @@ impl ShadowTrain {
         }
     }
 
-    /// The train's number.
+    /// Returns the train's number.
     pub fn id(&self) -> u64 {
         self.train.id.0
     }
 
-    /// The model in force.
+    /// Returns the model in force.
     pub fn in_force(&self) -> ModelHash {
         ModelHash(self.trials.in_force.model)
     }

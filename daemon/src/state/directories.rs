@@ -1,4 +1,4 @@
-//! Where states lie, and whether the daemon may keep them there.
+//! The directories of states, and the daemon's right to keep states there.
 
 use std::ffi::OsString;
 use std::fs::DirBuilder;
@@ -32,7 +32,7 @@ pub enum PlaceError {
     },
 }
 
-/// The directory to keep states in, made where it is not there: the one that the configuration names,
+/// Returns the directory to keep states in, made where it is not there: the one that the configuration names,
 /// else the usual one, which is closed to other users.
 ///
 /// # Errors

@@ -24,7 +24,7 @@ pub struct ModelKey {
 }
 
 impl ModelKey {
-    /// The key of a configured train.
+    /// Returns the key of a configured train.
     pub fn of(train: &TrainConfig) -> Self {
         ModelKey {
             train: train.id.0,
@@ -94,7 +94,7 @@ struct RawEstimate {
 }
 
 impl StateContent {
-    /// The content as text.
+    /// Returns the content as text.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! Why a state file is refused.
+//! Reasons why a state file is refused.
 
 use std::io;
 use std::path::{Path, PathBuf};

@@ -73,7 +73,7 @@ pub fn content_of(path: &Path, bytes: &[u8]) -> Result<String, StateError> {
     String::from_utf8(content.to_vec()).map_err(|_| none())
 }
 
-/// The bytes of a state file with this content.
+/// Returns the bytes of a state file with this content.
 pub fn bytes_of(content: &str) -> Vec<u8> {
     let sum = checksum(content.as_bytes());
     format!("{MAGIC} {SCHEMA} {} {sum:016x}\n{content}", content.len()).into_bytes()

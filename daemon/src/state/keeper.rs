@@ -41,7 +41,8 @@ pub struct StateKeeper {
 }
 
 impl StateKeeper {
-    /// A keeper that writes into the directory so often; `stored` is what the trains' states held at the start, by index of the train.
+    /// Returns a keeper that writes into the directory so often; `stored` is what the trains' states held at the start,
+    /// by index of the train.
     ///
     /// # Errors
     ///

@@ -34,7 +34,7 @@ pub use error::{StateError, StateProblem};
 
 use entry::{ModelKey, StateContent, StoredEstimate};
 
-/// Where a train's state lies.
+/// Returns where a train's state lies.
 pub fn path_of(directory: &Path, train: TrainId) -> PathBuf {
     directory.join(format!("train-{train}.state"))
 }

@@ -33,7 +33,7 @@ named! {
 }
 
 impl Verdict {
-    /// The verdict on a pipeline that is vouched for.
+    /// Returns the verdict on a pipeline that is vouched for.
     pub const fn of(status: Status, reason: Option<Reason>) -> Self {
         match (status, reason) {
             (Status::Degraded | Status::Invalid, _) => Verdict::Degraded,
@@ -57,7 +57,7 @@ impl Verdict {
         }
     }
 
-    /// The exit status of `dynocar health`.
+    /// Returns the exit status of `dynocar health`.
     pub const fn exit_status(self) -> u8 {
         match self {
             Verdict::Ok => 0,
@@ -180,7 +180,7 @@ pub fn look_at(host: &Host, train: TrainId) -> Result<TrainHealth, ChannelError>
     Ok(TrainHealth { train, verdict, daemon, pipelines })
 }
 
-/// The pipelines that speak up within [`PATIENCE`]; all of them do within a heartbeat.
+/// Returns the pipelines that speak up within [`PATIENCE`]; all of them do within a heartbeat.
 fn pipelines_of(observed: &mut ObservedTrain) -> Vec<PipelineHealth> {
     let start = Instant::now();
     let mut first_heard = None;

@@ -51,7 +51,7 @@ struct Families {
 }
 
 impl Families {
-    /// Name without the prefix, help and family of what only grows.
+    /// Returns the name without the prefix, help and family of what only grows.
     fn counters(&self) -> [(&'static str, &'static str, &Counters); 6] {
         [
             ("samples_used", "Samples that entered the estimate", &self.used),
@@ -63,7 +63,7 @@ impl Families {
         ]
     }
 
-    /// The same of what goes up and down.
+    /// Returns the same of what goes up and down.
     fn gauges(&self) -> [(&'static str, &'static str, &Gauges); 16] {
         [
             ("status", "1 for the status that holds", &self.status),
@@ -183,7 +183,7 @@ impl Families {
     }
 }
 
-/// The newest snapshots and what models on trial show, as OpenMetrics text; `names` are the
+/// Returns the newest snapshots and what models on trial show, as OpenMetrics text; `names` are the
 /// pipelines' by their number.
 pub fn text(trains: &mut [ObservedTrain], names: &[String], pinned: &Pinned) -> String {
     let families = Families::default();
@@ -216,7 +216,7 @@ mod tests {
 
     use super::*;
 
-    /// The metrics that a file of the project names.
+    /// Returns the metrics that a file of the project names.
     fn named(file: &str) -> BTreeSet<String> {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(file);
         let text = std::fs::read_to_string(path).expect("a file of the project");
@@ -244,7 +244,7 @@ mod tests {
         assert_eq!(hidden.iter().filter(|it| !is_trial(it)).count(), 0, "{hidden:?}");
     }
 
-    /// The metrics of one snapshot.
+    /// Returns the metrics of one snapshot.
     fn text_of(snapshot: &ParameterSnapshot, is_stale: bool) -> String {
         let families = Families::default();
         families.take(&Reading { snapshot, age_ns: 0, is_stale, quantity: None }, "one");

@@ -27,7 +27,7 @@ pub struct Supervisor {
 }
 
 impl Supervisor {
-    /// The supervisor that the environment names.
+    /// Returns the supervisor that the environment names.
     pub fn from_environment() -> Self {
         let variable = |name| std::env::var(name).ok();
         let limit = variable("WATCHDOG_USEC").and_then(|text| text.parse().ok());
@@ -36,7 +36,7 @@ impl Supervisor {
         Supervisor::at(variable("NOTIFY_SOCKET").as_deref(), limit.filter(|_| is_ours))
     }
 
-    /// The supervisor at a socket, with its watchdog's limit in µs.
+    /// Returns the supervisor at a socket, with its watchdog's limit in µs.
     pub fn at(path: Option<&str>, limit_us: Option<u64>) -> Self {
         let socket = path.filter(|path| !path.is_empty()).and_then(|path| {
             let address = match path.strip_prefix('@') {
@@ -83,7 +83,7 @@ pub struct Watchdog<'a> {
 }
 
 impl<'a> Watchdog<'a> {
-    /// A watchdog over pipelines by name.
+    /// Returns a watchdog over pipelines by name.
     pub fn new(supervisor: &'a Supervisor, pipelines: Vec<(String, Arc<Tally>)>) -> Self {
         let now = Instant::now();
         let seen = pipelines.iter().map(|_| SeenAlive { beats: 0, at: now, is_missed: false });

@@ -37,7 +37,7 @@ struct Arguments {
     plain: bool,
 }
 
-/// The command line of `dynocar watch`.
+/// Returns the command line of `dynocar watch`.
 pub fn command() -> clap::Command {
     Arguments::command()
 }
@@ -63,7 +63,7 @@ fn execute(arguments: &Arguments) -> Result<(), Failure> {
     terminal::run(&mut watcher, &ending, has_colour)
 }
 
-/// The trains to show; empty for all there are.
+/// Returns the trains to show; empty for all there are.
 fn wanted(arguments: &Arguments, config: Option<&DaemonConfig>) -> Result<Vec<TrainId>, Failure> {
     let asked: Vec<TrainId> = arguments.trains.iter().map(|&id| TrainId(id)).collect();
     let Some(config) = config else { return Ok(asked) };

@@ -1,4 +1,4 @@
-//! `dynocar watch`: what the daemon knows of its trains, live in a terminal, and what to drive next.
+//! `dynocar watch`: the daemon's estimates of its trains, live in a terminal, and the next manoeuvre to drive.
 //!
 //! It is one reader of the snapshots of each train, as every client is, and touches no control
 //! cycle.
@@ -6,9 +6,9 @@
 //! # Layout
 //!
 //! - [`cli`]: the command line
-//! - [`watcher`]: trains that are observed, and what is shown of them
+//! - [`watcher`]: the observed trains, and their shown state
 //! - [`state`]: a train as it is shown and its last minutes, without any clock or channel
-//! - [`advisor`]: what to drive next, now and then
+//! - [`advisor`]: advice on the next manoeuvre, now and then
 //! - [`words`]: numbers with intervals and units, a train's lines
 //! - [`screen`]: the screen, drawn from a [`state`]
 //! - [`plain`]: lines where there is no terminal

@@ -60,7 +60,7 @@ fn in_ascii(text: &str) -> String {
     letters.chars().map(|it| if it.is_ascii() { it } else { '?' }).collect()
 }
 
-/// A train in a line.
+/// Returns a train in a line.
 pub fn line(train: &TrainState) -> String {
     let mut parts = vec![daemon(&train.daemon, None)];
     for row in rows(train, &[0.5]) {

@@ -62,12 +62,12 @@ impl PipelineState {
         }
     }
 
-    /// The kind's name.
+    /// Returns the kind's name.
     pub fn kind(&self) -> &'static str {
         kind_of(&self.snapshot)
     }
 
-    /// The status, with its reason where there is one.
+    /// Returns the status, with its reason where there is one.
     pub fn status_words(&self) -> String {
         match self.reason {
             Some(Reason::None) => self.status.to_string(),
@@ -75,12 +75,12 @@ impl PipelineState {
         }
     }
 
-    /// The state of use of a quantity that it answers.
+    /// Returns the state of use of a quantity that it answers.
     pub fn use_of(&self, quantity: Quantity) -> UseState {
         UseState::of(self.status, self.snapshot.is_usable_for(quantity))
     }
 
-    /// Why that is so, in one word; empty where there is nothing to remark.
+    /// Returns why that is so, in one word; empty where there is nothing to remark.
     pub fn why(&self, quantity: Quantity) -> &'static str {
         let state = self.use_of(quantity);
         let why = state.why(self.reason);
@@ -110,7 +110,7 @@ pub struct TrainState {
 }
 
 impl TrainState {
-    /// A train of which nothing has been heard.
+    /// Returns a train of which nothing has been heard.
     pub fn new(id: TrainId, name: Option<String>) -> Self {
         TrainState {
             id,
@@ -122,12 +122,12 @@ impl TrainState {
         }
     }
 
-    /// The pipeline that answers a quantity.
+    /// Returns the pipeline that answers a quantity.
     pub fn answering(&self, quantity: Quantity) -> Option<&PipelineState> {
         self.pipelines.iter().find(|it| it.snapshot.answers(quantity))
     }
 
-    /// The pipeline that watches the residual: the monitor, else the one of the resistance.
+    /// Returns the pipeline that watches the residual: the monitor, else the one of the resistance.
     pub fn residual(&self) -> Option<&PipelineState> {
         let monitor = |it: &&PipelineState| {
             it.snapshot.pipeline_kind() == Some(PipelineKind::ResidualMonitor)
@@ -175,7 +175,7 @@ impl PlotHistory {
         });
     }
 
-    /// Samples a second lately.
+    /// Returns the samples a second lately.
     pub fn rate_hz(&self) -> Option<f64> {
         self.rate_hz
     }

@@ -1,4 +1,4 @@
-//! Trains that are observed, and what is shown of them.
+//! The observed trains, and their shown state.
 
 use std::mem::take;
 use std::time::{Duration, Instant};
@@ -34,7 +34,7 @@ struct Watched {
 }
 
 impl Watcher {
-    /// A watcher of these trains.
+    /// Returns a watcher of these trains.
     pub fn new(wanted: ObservedSelection, config: Option<DaemonConfig>) -> Self {
         let named = wanted.trains.clone();
         let watched = Vec::new();
@@ -43,12 +43,12 @@ impl Watcher {
         watcher
     }
 
-    /// Where daemons are looked for, in words.
+    /// Returns where daemons are looked for, in words.
     pub fn place(&self) -> String {
         self.wanted.host.root().display().to_string()
     }
 
-    /// The trains as they are now.
+    /// Returns the trains as they are now.
     pub fn trains(&self) -> Vec<&TrainState> {
         self.watched.iter().map(|it| &it.state).collect()
     }

@@ -1,4 +1,4 @@
-//! Numbers with intervals and units, and what is said of a train, for screen and lines alike.
+//! Numbers with intervals and units, and sentences on a train, for screen and lines alike.
 
 use dynocar::operator::{Suspicion, duration, force_words, refusals};
 use dynocar_shared::{HALF_95, Parameter, Quantity, UseState};
@@ -24,7 +24,7 @@ pub struct QuantityRow {
     pub age_s: Option<f64>,
 }
 
-/// The table of a train's quantities; the resistance at these shares of the speeds driven.
+/// Returns the table of a train's quantities; the resistance at these shares of the speeds driven.
 pub fn rows(train: &TrainState, shares: &[f64]) -> Vec<QuantityRow> {
     let mut all = Vec::new();
     for &quantity in Quantity::ALL {
@@ -70,7 +70,7 @@ fn resistance_rows(pipeline: &PipelineState, shares: &[f64]) -> Vec<QuantityRow>
     davis.into_iter().filter_map(of_parameter).chain(shares.iter().filter_map(at_speed)).collect()
 }
 
-/// The value of a quantity other than the resistance.
+/// Returns the value of a quantity other than the resistance.
 fn main_value(quantity: Quantity, pipeline: &PipelineState) -> QuantityRow {
     let candidates: &[Parameter] = match quantity {
         Quantity::Resistance => &[],
@@ -93,7 +93,7 @@ fn main_value(quantity: Quantity, pipeline: &PipelineState) -> QuantityRow {
     }
 }
 
-/// The unit of a parameter's value in a snapshot.
+/// Returns the unit of a parameter's value in a snapshot.
 fn unit(parameter: Parameter) -> &'static str {
     match parameter {
         Parameter::DavisA => "N/kN",
@@ -104,7 +104,7 @@ fn unit(parameter: Parameter) -> &'static str {
     }
 }
 
-/// A value with its interval, to two digits of the interval.
+/// Returns a value with its interval, to two digits of the interval.
 fn with_interval(value: f64, std: f64, unit: &'static str) -> QuantityRow {
     let half = HALF_95 * std;
     let digits = digits(half);
@@ -117,7 +117,7 @@ fn digits(half: f64) -> usize {
     if half > 0.0 { (1.0 - half.log10().floor()).clamp(0.0, 7.0) as usize } else { 3 }
 }
 
-/// Who serves a train.
+/// Returns who serves a train.
 pub fn daemon(daemon: &Daemon, up_s: Option<f64>) -> String {
     match daemon {
         Daemon::Absent => "no daemon serves it; waiting".to_owned(),
@@ -144,7 +144,7 @@ pub fn samples(train: &TrainState) -> String {
     format!("{rate} samples/s, used {used}, rejected {rejected}{why}, lost {lost}")
 }
 
-/// The unexplained force with its interval, and the suspect with what else it could be.
+/// Returns the unexplained force with its interval, and the suspect with what else it could be.
 pub fn residual(train: &TrainState) -> Option<(String, String)> {
     let snapshot = &train.residual()?.snapshot;
     let force = force_words(snapshot.unexplained_force_n, snapshot.unexplained_force_std_n);

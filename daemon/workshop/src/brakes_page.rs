@@ -74,7 +74,7 @@ fn as_html<T>(
     table(caption, &columns, rows)
 }
 
-/// The page: decelerations over speed, steps, corrections, and what they are not.
+/// Returns the page: decelerations over speed, steps, corrections, and what they are not.
 pub fn html(answer: &BrakesAnswer, made: &Provenance) -> String {
     let name = escape(&answer.datasets.join(", "));
     let header = format!(

@@ -16,7 +16,7 @@ use dynocar_parquet::reading;
 
 use super::convert::{ModelFiles, RecordedDataset, dataset_of};
 
-/// True for the name of a recording.
+/// Returns true for the name of a recording.
 pub fn is_recording(path: &Path) -> bool {
     let is_mcap = path.extension().is_some_and(|it| it == "mcap") && path.is_file();
     is_mcap || is_parquet_path(path) && path.exists()
@@ -41,7 +41,7 @@ pub enum FilesOfDataset {
 }
 
 impl FilesOfDataset {
-    /// Those of the dataset at a path: its folder, its `dataset.toml`, or a recording.
+    /// Returns those of the dataset at a path: its folder, its `dataset.toml`, or a recording.
     ///
     /// # Errors
     ///
@@ -64,12 +64,12 @@ impl FilesOfDataset {
         Ok(FilesOfDataset::Recording(dataset))
     }
 
-    /// True for a recording, beside which nothing of them lies.
+    /// Returns true for a recording, beside which nothing of them lies.
     pub fn is_recording(&self) -> bool {
         matches!(self, FilesOfDataset::Recording(_))
     }
 
-    /// Where a file lies, or would lie.
+    /// Returns where a file lies, or would lie.
     pub fn path_of(&self, path: &str) -> PathBuf {
         match self {
             FilesOfDataset::Folder(folder) => folder.path_of(path),
@@ -77,7 +77,7 @@ impl FilesOfDataset {
         }
     }
 
-    /// The bytes of a file; none where there is none.
+    /// Returns the bytes of a file; none where there is none.
     pub fn bytes(&self, path: &str) -> Cow<'_, [u8]> {
         match self {
             FilesOfDataset::Folder(it) => {
@@ -159,12 +159,12 @@ pub fn load_with_speed_unit<'p>(
     Ok((head.read(&files)?, unit))
 }
 
-/// The way from a folder, which need not be there yet, to a file.
+/// Returns the way from a folder, which need not be there yet, to a file.
 pub fn from_folder(folder: &Path, file: &Path) -> PathBuf {
     relative(&real(file), &real(folder))
 }
 
-/// A path without links, as far as it is there.
+/// Returns a path without links, as far as it is there.
 pub fn real(path: &Path) -> PathBuf {
     let full = std::path::absolute(path).unwrap_or_else(|_| path.into());
     for known in full.ancestors() {
@@ -176,7 +176,7 @@ pub fn real(path: &Path) -> PathBuf {
     full
 }
 
-/// The way from a folder to a file, both in full.
+/// Returns the way from a folder to a file, both in full.
 fn relative(file: &Path, folder: &Path) -> PathBuf {
     let (file, folder): (Vec<Component>, Vec<Component>) =
         (file.components().collect(), folder.components().collect());

@@ -48,7 +48,7 @@ fn shown(folders: &[PathBuf]) -> String {
     names.join(", ")
 }
 
-/// The library of this release, where cargo or a package put it beside a program.
+/// Returns the library of this release, where cargo or a package put it beside a program.
 ///
 /// # Errors
 ///
@@ -61,7 +61,7 @@ pub fn find_library(program: &Path) -> Result<Vec<u8>, FmuError> {
     found.ok_or_else(|| FmuError::NoLibrary(folders.into()))
 }
 
-/// The library at a path.
+/// Returns the library at a path.
 ///
 /// # Errors
 ///
@@ -102,7 +102,7 @@ pub fn archive(
     Ok(archive.finish()?.into_inner())
 }
 
-/// The folder of binaries for this platform: by FMI 2.0 for the one that it names, by 3.0 for others.
+/// Returns the folder of binaries for this platform: by FMI 2.0 for the one that it names, by 3.0 for others.
 fn platform() -> String {
     match std::env::consts::ARCH {
         "x86_64" => "linux64".into(),
@@ -116,7 +116,7 @@ const TIME: &str = "time";
 /// How a file of inputs begins, so that one is known again.
 pub const INPUTS_MARK: &str = "time,position_m,speed_mps,";
 
-/// A recorded run as a CSV file of the inputs of the estimators' FMU over time in s, `NaN` where
+/// Returns a recorded run as a CSV file of the inputs of the estimators' FMU over time in s, `NaN` where
 /// missing; the train's takes its own from there.
 pub fn inputs(run: &Run) -> String {
     let is_input = |meaning: &Meaning| meaning.causality() == "input";

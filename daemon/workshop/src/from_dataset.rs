@@ -83,7 +83,7 @@ pub fn from_dataset(folder: &Path, path: &Path) -> Result<usize, FromDatasetErro
     Ok(samples.len())
 }
 
-/// The samples of runs that were made of a recording; else those that a controller would publish.
+/// Returns the samples of runs that were made of a recording; else those that a controller would publish.
 fn samples(
     dataset: &Dataset,
     contents: &[(String, Vec<u8>)],

@@ -1,4 +1,4 @@
-//! The workshop: what is done with recorded runs and files, away from the controller.
+//! The workshop: work on recorded runs and files, away from the controller.
 //!
 //! It reads and writes through the daemon's library, so that both understand a file alike; the daemon
 //! knows nothing of it but its program's name.
@@ -13,7 +13,7 @@
 //! - [`learn`]: recorded runs into candidates for the store
 //! - [`updated`]: the model with its effects as train and track files, and a dataset of them
 //! - [`report`]: an explanation as a page of HTML
-//! - [`run_facts`]: what is shown of a recorded run
+//! - [`run_facts`]: facts and notes on a recorded run
 //! - [`survey`]: raw recordings to a dataset on a surveyed line
 //! - [`verify`]: every recorded snapshot computed again
 

@@ -7,7 +7,7 @@ use dynocar_analysis::dataset::{
 };
 use dynocar_core::plausibility::Severity;
 
-/// A run's mass in t: the declared one, or the mean of what its samples carry, with the range where they
+/// Returns a run's mass in t: the declared one, or the mean of what its samples carry, with the range where they
 /// carry several.
 pub fn mass_t(run: &Run) -> String {
     let Some(spread) = run.quality.mass_kg else { return tonnes(run.mass_kg) };
@@ -15,7 +15,7 @@ pub fn mass_t(run: &Run) -> String {
     if low == high { mean } else { format!("{mean} ({low}–{high})") }
 }
 
-/// A mass in t: to the kilogram for a light vehicle, else to 100 kg.
+/// Returns a mass in t: to the kilogram for a light vehicle, else to 100 kg.
 pub fn tonnes(mass_kg: f64) -> String {
     let decimals = if mass_kg < 10e3 { 3 } else { 1 };
     format!("{:.decimals$}", mass_kg / 1000.0)
@@ -27,12 +27,12 @@ pub fn recorded(run: &Run) -> Option<UtcSecond> {
     Some(UtcSecond { unix_s })
 }
 
-/// The same in words, as people write it.
+/// Returns the same in words, as people write it.
 pub fn recorded_in_words(run: &Run) -> String {
     recorded(run).map_or_else(|| "–".into(), |at| at.to_string().replace('T', " ").replace('Z', ""))
 }
 
-/// Where a run's position, gradient, traction force and brake force come from, in words.
+/// Returns where a run's position, gradient, traction force and brake force come from, in words.
 pub fn sources(run: &Run) -> [&'static str; 4] {
     let position = match run.position_source {
         PositionSource::Column => "as recorded",

@@ -90,7 +90,7 @@ pub struct UpdatedTexts {
     pub not_expressed: Vec<String>,
 }
 
-/// The texts of a model that grew from declared ones of a train and a line; `labels` and `source` say in
+/// Returns the texts of a model that grew from declared ones of a train and a line; `labels` and `source` say in
 /// their first lines what they grew from.
 ///
 /// # Errors

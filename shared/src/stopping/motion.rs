@@ -17,7 +17,7 @@ struct Progress {
 }
 
 impl Stop<'_> {
-    /// Distance and time; the speed without deceleration else.
+    /// Returns the distance and time; the speed without deceleration else.
     pub(super) fn integrate(&self, shift: Shift) -> Result<(f64, f64), f64> {
         let built_up = self.build_up(shift);
         let step_mps = (built_up.speed_mps - self.to_speed_mps) / (2 * STEPS) as f64;
@@ -42,7 +42,7 @@ impl Stop<'_> {
         Ok((built_up.distance_m + distance_m * share, built_up.time_s + time_s * share))
     }
 
-    /// Where the train is once the brake acts in full, or has come to its last speed before.
+    /// Returns where the train is once the brake acts in full, or has come to its last speed before.
     fn build_up(&self, shift: Shift) -> Progress {
         let response = &self.response;
         let dead_s = response.dead_time_s + shift.response * response.std_s;
@@ -76,7 +76,7 @@ impl Stop<'_> {
         self.mass_kg * (1.0 + self.rotating_mass_factor)
     }
 
-    /// Deceleration at a speed, a time in s after the brake's dead time.
+    /// Returns the deceleration at a speed, a time in s after the brake's dead time.
     fn deceleration_mps2(&self, speed_mps: f64, shift: Shift, applied_s: f64) -> f64 {
         let weight_n = self.mass_kg * self.gravity_mps2;
         let full_n =

@@ -207,7 +207,7 @@ fn adhesion_learned_at_the_end_of_a_braking_does_not_shorten_the_next_one_from_f
     assert_eq!(RailAdhesion::learned(&snapshot), None);
 }
 
-/// A stop at 1 m/s² from 20 m/s on the level by a brake that comes as given.
+/// Returns a stop at 1 m/s² from 20 m/s on the level by a brake that comes as given.
 fn coming(response: BrakeResponse) -> StoppingEstimate {
     Stop { response, ..Stop::level(20.0, 1e5, NO_RESISTANCE, &constant(1e5)) }
         .estimate(0.95)
@@ -274,7 +274,7 @@ struct Braked {
 }
 
 impl Braked {
-    /// Distance in m by small steps of time, with a force and a dead time in standard deviations off.
+    /// Returns the distance in m by small steps of time, with a force and a dead time in standard deviations off.
     fn driven_m(&self, gradient_permille: f64, force_off: f64, time_off: f64) -> f64 {
         let BrakeResponse { dead_time_s, build_up_s, jerk_limit_mps3, std_s, .. } = self.response;
         let (full_mps2, step_s) = (self.force_n / self.mass_kg, 1e-3);

@@ -267,14 +267,14 @@ effects! {
 }
 
 impl EffectKind {
-    /// The effect's bit in [`crate::ParameterSnapshot::suspected_alternatives`].
+    /// Returns the effect's bit in [`crate::ParameterSnapshot::suspected_alternatives`].
     pub const fn bit(self) -> u32 {
         1 << self as u32
     }
 }
 
 impl KindRow {
-    /// The row of a kind.
+    /// Returns the row of a kind.
     pub const fn of(kind: EffectKind) -> &'static KindRow {
         &KINDS[kind as usize]
     }

@@ -1,4 +1,4 @@
-//! Whether a controller may use what it asked for, why, and what ends that.
+//! State of use of a quantity: whether a controller may use it, the reason, and the condition that ends the state.
 
 use super::{Reason, Status};
 

@@ -69,12 +69,12 @@ impl Announcement {
         }
     }
 
-    /// True when both sides map the same bytes.
+    /// Returns whether both sides map the same bytes.
     pub fn is_compatible_with(&self, other: &Announcement) -> bool {
         self.understands(other) && self.memory == other.memory
     }
 
-    /// True when both sides are of releases that understand each other.
+    /// Returns whether both sides are of releases that understand each other.
     pub(crate) fn understands(&self, other: &Announcement) -> bool {
         self.schema == other.schema
             && self.memory.is_some() == other.memory.is_some()

@@ -1,4 +1,4 @@
-//! Why a channel cannot be opened or used.
+//! Errors of opening and using a channel.
 
 use std::path::PathBuf;
 
@@ -199,7 +199,7 @@ impl ChannelError {
         }
     }
 
-    /// Why nothing passes between an incompatible peer and this process.
+    /// Returns why nothing passes between an incompatible peer and this process.
     pub fn of_peer(train: TrainId, theirs: Announcement, our_role: Role) -> Self {
         let (theirs, ours) = (Box::new(theirs), Box::new(Announcement::of_this_process(our_role)));
         if ours.understands(&theirs) {

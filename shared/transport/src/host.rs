@@ -1,4 +1,4 @@
-//! Where the run-time files of this host lie, and its monotonic clock, common to all its processes.
+//! The run-time files of this host, and its monotonic clock, common to all its processes.
 //!
 //! A root directory holds who serves and who drives each train, in `trains/`. The transport's files lie
 //! beside its segments in `/dev/shm`, under names that follow from the root's device, inode and
@@ -52,7 +52,7 @@ pub struct Host {
 }
 
 impl Host {
-    /// The root that the variable `DYNOCAR_ROOT` names, else `/tmp/dynocar-<user id>`.
+    /// Returns the root that the variable `DYNOCAR_ROOT` names, else `/tmp/dynocar-<user id>`.
     ///
     /// # Errors
     ///
@@ -67,7 +67,7 @@ impl Host {
         }
     }
 
-    /// A root of its own where one is named, else that of the environment.
+    /// Returns a root of its own where one is named, else that of the environment.
     ///
     /// # Errors
     ///
@@ -76,7 +76,7 @@ impl Host {
         root.map_or_else(Host::from_environment, Host::at)
     }
 
-    /// A root of its own; the directory is made, for this user only, when it is missing.
+    /// Returns a root of its own; the directory is made, for this user only, when it is missing.
     ///
     /// # Errors
     ///
@@ -100,17 +100,17 @@ impl Host {
         Ok(Host { root: root.to_path_buf(), identity })
     }
 
-    /// The root directory.
+    /// Returns the root directory.
     pub fn root(&self) -> &Path {
         &self.root
     }
 
-    /// Where the announcements lie.
+    /// Returns where the announcements lie.
     pub fn trains_directory(&self) -> PathBuf {
         self.root.join(TRAINS)
     }
 
-    /// Where the transport keeps its files, apart from its segments: in memory, so that nothing of a dead
+    /// Returns where the transport keeps its files, apart from its segments: in memory, so that nothing of a dead
     /// host's is left, and nothing is aged.
     pub fn transport_directory(&self) -> PathBuf {
         let prefix = self.segment_prefix();
@@ -144,7 +144,7 @@ impl Host {
         File::open(&self.root).map_err(unusable(&self.root, "opening"))
     }
 
-    /// The transport's configuration for this root.
+    /// Returns the transport's configuration for this root.
     ///
     /// # Errors
     ///
@@ -165,7 +165,7 @@ impl Host {
     }
 }
 
-/// The failure of a system call on a file or a directory.
+/// Returns the failure of a system call on a file or a directory.
 pub(crate) fn unusable<'a>(
     path: &'a Path,
     action: &'static str,
@@ -224,7 +224,7 @@ fn make_private_directory(path: &Path) -> Result<(), ChannelError> {
     Ok(())
 }
 
-/// Nanoseconds since boot, never set back; read through the vDSO, without a system call.
+/// Returns the nanoseconds since boot, never set back; read through the vDSO, without a system call.
 pub fn monotonic_now_ns() -> i64 {
     let now = clock_gettime(ClockId::Monotonic);
     now.tv_sec * 1_000_000_000 + now.tv_nsec

@@ -11,12 +11,12 @@ pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 /// A directory, whatever it is called: its device and its inode.
 pub(crate) type Identity = [u64; 2];
 
-/// The identity of the directory at a path.
+/// Returns the identity of the directory at a path.
 pub(crate) fn identity_of(path: &Path) -> std::io::Result<Identity> {
     std::fs::metadata(path).map(|it| identity(&it))
 }
 
-/// The identity of the file or directory of these attributes.
+/// Returns the identity of the file or directory of these attributes.
 pub(crate) fn identity(attributes: &Metadata) -> Identity {
     [attributes.dev(), attributes.ino()]
 }
@@ -30,7 +30,7 @@ pub(crate) struct DirectoryIdentity {
 }
 
 impl DirectoryIdentity {
-    /// The identity of the directory at a path.
+    /// Returns the identity of the directory at a path.
     pub(crate) fn of(path: &Path) -> std::io::Result<Self> {
         let attributes = std::fs::metadata(path)?;
         let born = attributes.created().ok().and_then(|it| it.duration_since(UNIX_EPOCH).ok());
@@ -38,7 +38,7 @@ impl DirectoryIdentity {
         Ok(DirectoryIdentity { place: identity(&attributes), born_ns })
     }
 
-    /// A number for its names.
+    /// Returns a number for its names.
     pub(crate) fn hash(&self) -> u32 {
         let [device, inode] = self.place;
         let mut hash = 0xcbf2_9ce4_8422_2325_u64;

@@ -1,4 +1,4 @@
-//! Who serves and who drives a train, and whether we understand each other.
+//! The serving and the driving side of a train, and their compatibility.
 //!
 //! Each side keeps a small text file locked while it lives. The kernel drops the lock when the
 //! process dies, however it dies, so that a locked file means a living peer. The files lie
@@ -30,7 +30,7 @@ pub enum Peer {
 }
 
 impl Peer {
-    /// Who holds a role for a train now.
+    /// Returns who holds a role for a train now.
     ///
     /// Opens a file: call it outside the control cycle.
     ///
@@ -58,7 +58,7 @@ impl Peer {
         }
     }
 
-    /// The trains for which a living process holds a role, in order.
+    /// Returns the trains for which a living process holds a role, in order.
     ///
     /// # Errors
     ///

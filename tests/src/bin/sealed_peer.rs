@@ -66,7 +66,7 @@ fn cycle(
     (reader.poll() as u64, sample.sequence)
 }
 
-/// The newest sample that was answered.
+/// Returns the newest sample that was answered.
 fn newest(reader: &SnapshotReader) -> u64 {
     let readings = reader.readings(monotonic_now_ns());
     readings.map(|reading| reading.snapshot.sample_sequence).max().unwrap_or(0)

@@ -1,4 +1,4 @@
-//! A disk that loses what was not brought to it: every state in which a power cut may leave it.
+//! A disk that loses unsynced writes: every state in which a power cut may leave it.
 //!
 //! The disk is asked what [`Storage`] asks of one, and notes each step. After a cut there are, in
 //! any combination: names whose change was not brought to the disk, changed or not, each on its
@@ -77,7 +77,7 @@ pub struct LossyDisk {
 }
 
 impl LossyDisk {
-    /// An empty disk.
+    /// Returns an empty disk.
     pub fn new(neglect: Neglect) -> Self {
         let names = BTreeMap::new();
         let asked = Asked { neglect, steps: Vec::new(), names, files: 0 };

@@ -1,4 +1,4 @@
-//! A real folder, and beside it what a power cut would leave of it.
+//! A real folder, and a record of its state after a power cut.
 
 use std::io::{self, Write};
 use std::path::Path;

@@ -33,7 +33,7 @@ pub enum CutStep {
 }
 
 impl CutStep {
-    /// The folder in which a step changes names.
+    /// Returns the folder in which a step changes names.
     fn folder(&self) -> Option<&Path> {
         match self {
             CutStep::Make { path, .. } | CutStep::Remove { path } => Some(folder_of(path)),
@@ -88,7 +88,7 @@ impl AfterSteps {
         }
     }
 
-    /// Everything that a cut now may leave.
+    /// Returns everything that a cut now may leave.
     pub fn left(&self) -> Vec<Left> {
         let done = self.changes.len().saturating_sub(NAMES_MAX);
         let (old, open) = self.changes.split_at(done);
@@ -106,7 +106,7 @@ impl AfterSteps {
         all
     }
 
-    /// Every combination of the contents that the named files may have; two names of a file have the same.
+    /// Returns every combination of the contents that the named files may have; two names of a file have the same.
     fn with_bytes(&self, names: &BTreeMap<PathBuf, usize>) -> Vec<Left> {
         let mut names_of: BTreeMap<usize, Vec<&PathBuf>> = BTreeMap::new();
         for (path, file) in names {

@@ -52,7 +52,7 @@ impl Process {
         Process { child, lines: Arc::default(), errors: PathBuf::new() }
     }
 
-    /// Its process number.
+    /// Returns its process number.
     pub fn id(&self) -> u32 {
         self.child.id()
     }
@@ -123,7 +123,7 @@ impl Process {
         }
     }
 
-    /// Its exit status, if it has ended.
+    /// Returns its exit status, if it has ended.
     ///
     /// # Panics
     ///
@@ -132,7 +132,7 @@ impl Process {
         self.child.try_wait().expect("an exit status")
     }
 
-    /// Everything that a program which has ended wrote to standard output.
+    /// Returns everything that a program which has ended wrote to standard output.
     ///
     /// # Panics
     ///
@@ -142,7 +142,7 @@ impl Process {
         self.lines().join("\n")
     }
 
-    /// Its standard output so far.
+    /// Returns its standard output so far.
     ///
     /// # Panics
     ///
@@ -151,7 +151,7 @@ impl Process {
         self.lines.lock().expect("no panic while holding the lines").clone()
     }
 
-    /// Its newest line of standard output.
+    /// Returns its newest line of standard output.
     ///
     /// # Panics
     ///
@@ -160,7 +160,7 @@ impl Process {
         self.lines.lock().expect("no panic while holding the lines").last().cloned()
     }
 
-    /// Its standard output from a line on.
+    /// Returns its standard output from a line on.
     ///
     /// # Panics
     ///
@@ -169,7 +169,7 @@ impl Process {
         self.lines.lock().expect("no panic while holding the lines")[first..].to_vec()
     }
 
-    /// Its standard error so far.
+    /// Returns its standard error so far.
     pub fn errors(&self) -> String {
         std::fs::read_to_string(&self.errors).unwrap_or_default()
     }

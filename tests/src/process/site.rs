@@ -22,7 +22,7 @@ impl Default for DaemonSite {
 }
 
 impl DaemonSite {
-    /// A new, empty site.
+    /// Returns a new, empty site.
     ///
     /// # Panics
     ///
@@ -31,12 +31,12 @@ impl DaemonSite {
         DaemonSite { directory: TempDir::new().expect("a temporary directory") }
     }
 
-    /// The site's folder for files.
+    /// Returns the site's folder for files.
     pub fn path(&self) -> &Path {
         self.directory.path()
     }
 
-    /// The site's run-time directory.
+    /// Returns the site's run-time directory.
     ///
     /// # Panics
     ///
@@ -120,7 +120,7 @@ impl DaemonSite {
         self.start_command(command)
     }
 
-    /// A program on this site that is not started yet.
+    /// Returns a program on this site that is not started yet.
     pub fn command(&self, program: &str, arguments: &[&str]) -> Command {
         let mut command = Command::new(program);
         // A place of its own for each process: no daemon starts from what another learned unless a test says so.

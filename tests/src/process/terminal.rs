@@ -39,7 +39,7 @@ impl Default for Terminal {
 }
 
 impl Terminal {
-    /// A new terminal of 80 times 24 characters.
+    /// Returns a new terminal of 80 times 24 characters.
     ///
     /// # Panics
     ///

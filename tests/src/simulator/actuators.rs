@@ -1,4 +1,4 @@
-//! Drives, brakes and cylinders: from what the driver wants to what acts.
+//! Drives, brakes and cylinders: acting forces from the driver's commands.
 
 use std::collections::VecDeque;
 
@@ -110,7 +110,7 @@ impl LateForces {
         LateForces { waiting, force: initial, step_s, lag_s }
     }
 
-    /// The true forces when these are reported.
+    /// Returns the true forces when these are reported.
     pub fn advance(&mut self, reported: Controls) -> Controls {
         self.waiting.push_back(reported);
         let arrived = self.waiting.pop_front().unwrap_or(reported);

@@ -1,4 +1,4 @@
-//! How the recorded quantities are named and in which units they are written.
+//! Names and units of the recorded quantities.
 
 use dynocar_shared::{SampleField, TrainSample};
 
@@ -29,7 +29,7 @@ pub enum ColumnKind {
 }
 
 impl ColumnKind {
-    /// The canonical name in `dataset.toml`.
+    /// Returns the canonical name in `dataset.toml`.
     pub const fn canonical(self) -> &'static str {
         match self {
             ColumnKind::Time => "time",
@@ -113,7 +113,7 @@ impl Column {
         has_odometer || self.quantity != ColumnKind::Position
     }
 
-    /// The file's text for an SI value.
+    /// Returns the file's text for an SI value.
     pub fn text(&self, si: f64) -> String {
         let value = (si * self.per_si + self.addend) / self.scale;
         format!("{value:.*}", self.decimals)

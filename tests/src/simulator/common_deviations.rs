@@ -33,7 +33,7 @@ const WAVES_M: (f64, f64) = (1500.0, 8000.0);
 const WARMING_S: (f64, f64) = (150.0, 400.0);
 
 impl CommonDeviations {
-    /// The draw of a seed.
+    /// Returns the draw of a seed.
     pub fn draw(deviations: &TrueDeviations, seed: u64) -> Self {
         let mut random = SimulatorRandom::new(seed, Stream::Deviations);
         let mut near_one = |share: f64| 1.0 + share * random.gaussian();

@@ -18,7 +18,7 @@ const HELD_MPS: f64 = 0.05;
 /// Damping of a coupling as share of the critical one of two cars.
 const DAMPING_RATIO: f64 = 0.15;
 
-/// Stiffness in N/m and slack in m of one coupling.
+/// Returns the stiffness in N/m and slack in m of one coupling.
 fn coupling(train_type: TrainType) -> (f64, f64) {
     match train_type {
         TrainType::Freight => (1.2e7, 0.015),
@@ -26,7 +26,7 @@ fn coupling(train_type: TrainType) -> (f64, f64) {
     }
 }
 
-/// Share of the traction that a car gives: the locomotive pulls, or the leading third of a multiple unit.
+/// Returns the share of the traction that a car gives: the locomotive pulls, or the leading third of a multiple unit.
 fn traction_share(train_type: TrainType, index: usize, cars: usize) -> f64 {
     let pulling = if train_type == TrainType::Freight { 1 } else { cars.div_ceil(3) };
     if index < pulling { 1.0 / pulling as f64 } else { 0.0 }
@@ -57,7 +57,7 @@ impl Chain {
         }
     }
 
-    /// Force in N between a car and the one behind it, positive when it pulls.
+    /// Returns the force in N between a car and the one behind it, positive when it pulls.
     fn pull_n(&self, front: usize) -> f64 {
         let apart_m = self.ahead_m[front] - self.ahead_m[front + 1];
         let stretched_m = apart_m - apart_m.clamp(-0.5 * self.slack_m, 0.5 * self.slack_m);

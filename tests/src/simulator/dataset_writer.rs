@@ -19,7 +19,7 @@ const GNSS_COLUMNS: &str = "latitude = { column = \"lat\", unit = \"deg\" }\n\
     longitude = { column = \"lon\", unit = \"deg\" }\n\
     altitude = { column = \"alt\", unit = \"m\" }";
 
-/// The files of a dataset; nothing in them reveals the truth.
+/// Returns the files of a dataset; nothing in them reveals the truth.
 pub fn dataset_files(dataset: &SimulatedDataset) -> Vec<FileText> {
     let settings = &dataset.settings;
     let extra_decimals = if settings.sensor_noise == 0.0 { 4 } else { 0 };

@@ -1,4 +1,4 @@
-//! How the effects change the physics and the sensors of one run.
+//! Changes of the physics and the sensors of one run by the effects.
 
 use dynocar_model::terms::{
     Resistance, adhesion, ambient, bearings, brake, curve, place, tunnel, wind,
@@ -106,7 +106,7 @@ pub struct DisturbanceInput {
 }
 
 impl Disturbances {
-    /// Nothing undeclared.
+    /// Returns nothing undeclared.
     ///
     /// # Panics
     ///
@@ -314,7 +314,7 @@ impl Disturbances {
         last.map_or(1.0, |(_, load)| *load) * self.effect_mass_factor(time_s, centre_m)
     }
 
-    /// The part of it that is an undeclared effect.
+    /// Returns the part of it that is an undeclared effect.
     pub fn effect_mass_factor(&self, time_s: f64, centre_m: f64) -> f64 {
         let by_time = self
             .mass_windows
@@ -330,7 +330,7 @@ impl Disturbances {
         by_time.or_else(by_place).unwrap_or(1.0)
     }
 
-    /// Force in N of a dragging brake at a time in s from the start; it builds up over 10 s.
+    /// Returns the force in N of a dragging brake at a time in s from the start; it builds up over 10 s.
     pub fn drag_n(&self, time_s: f64) -> f64 {
         let share = self
             .drag_windows
@@ -343,7 +343,7 @@ impl Disturbances {
 }
 
 impl AdhesionCap {
-    /// The brake force in N that the rail carries at a chainage in m.
+    /// Returns the brake force in N that the rail carries at a chainage in m.
     pub fn carried_n(&self, brake_n: f64, weight_n: f64, centre_m: f64) -> f64 {
         let is_inside = self.intervals_m.is_empty()
             || self.intervals_m.iter().any(|&(from_m, to_m)| (from_m..=to_m).contains(&centre_m));
@@ -351,7 +351,7 @@ impl AdhesionCap {
     }
 }
 
-/// A step profile with an error added, in steps as fine as the error is given.
+/// Returns a step profile with an error added, in steps as fine as the error is given.
 fn with_error(
     map: &StepProfile,
     error_entries: &[(f64, f64)],
@@ -368,7 +368,7 @@ fn with_error(
     StepProfile::new(&entries).expect("sorted chainages")
 }
 
-/// A step profile whose steps are rounded over a length in m, in small steps.
+/// Returns a step profile whose steps are rounded over a length in m, in small steps.
 fn rounded_steps(profile: &StepProfile, length_m: f64) -> StepProfile {
     const PIECE_M: f64 = 10.0;
     let entries: Vec<(f64, f64)> = profile.entries().collect();
@@ -386,7 +386,7 @@ fn rounded_steps(profile: &StepProfile, length_m: f64) -> StepProfile {
     StepProfile::new(&rounded.collect::<Vec<_>>()).expect("sorted chainages")
 }
 
-/// A profile of `value` within ordered intervals and zero elsewhere.
+/// Returns a profile of `value` within ordered intervals and zero elsewhere.
 pub(super) fn interval_profile(intervals_m: &[(f64, f64)], value: f64) -> StepProfile {
     let mut entries = vec![(f64::MIN / 4.0, 0.0)];
     for &(from_m, to_m) in intervals_m {

@@ -45,7 +45,7 @@ pub struct TrainDriver<'a> {
 }
 
 impl<'a> TrainDriver<'a> {
-    /// A driver who stands at the run's start for some seconds.
+    /// Returns a driver who stands at the run's start for some seconds.
     pub fn new(
         train: &'a TrueTrain,
         line: &'a SimulatedLine,
@@ -68,7 +68,7 @@ impl<'a> TrainDriver<'a> {
         TrainDriver { train, line, plan, declared, random, stops_m, next_stop: 0, permitted, mode }
     }
 
-    /// Greatest holding force in N.
+    /// Returns the greatest holding force in N.
     pub fn holding_force_n(train: &TrueTrain) -> f64 {
         train.handling.holding_share * train.brake_max_n(0.0)
     }
@@ -149,14 +149,14 @@ impl<'a> TrainDriver<'a> {
         };
     }
 
-    /// The force in N along the travel that gives an acceleration in m/s², by the declared model.
+    /// Returns the force in N along the travel that gives an acceleration in m/s², by the declared model.
     fn force_for_n(&self, motion: SimulatedMotion, acceleration_mps2: f64) -> f64 {
         let inertia_kg = self.declared.mass_kg * (1.0 + self.declared.train.rotating_mass_factor);
         let coasting_mps2 = self.declared.acceleration_mps2(motion, Controls::default());
         inertia_kg * (acceleration_mps2 - coasting_mps2)
     }
 
-    /// Deceleration wanted while braking, as an acceleration in m/s².
+    /// Returns the deceleration wanted while braking, as an acceleration in m/s².
     fn braking_acceleration_mps2(&self, motion: SimulatedMotion) -> f64 {
         let (speed_mps, stop_m) = (motion.speed_mps, self.stop_distance_m(motion));
         let ordinary_mps2 = self.braking_mps2();

@@ -15,7 +15,7 @@ pub struct Controls {
 
 /// Decides on the forces.
 pub trait Driver {
-    /// The forces from `time_s` on, given where the train is; `None` ends the run.
+    /// Returns the forces from `time_s` on, given where the train is; `None` ends the run.
     fn controls(&mut self, time_s: f64, motion: SimulatedMotion) -> Option<Controls>;
 }
 
@@ -42,7 +42,7 @@ pub struct TrainOnLine<'a> {
 }
 
 impl TrainOnLine<'_> {
-    /// Chainage in m of the train's centre.
+    /// Returns the chainage in m of the train's centre.
     pub fn position_m(&self, motion: SimulatedMotion) -> f64 {
         self.start_m + self.direction * motion.distance_m
     }

@@ -45,7 +45,7 @@ pub struct SimulatedResistance {
 }
 
 impl SimulatedResistance {
-    /// All together.
+    /// Returns all together.
     pub fn total_n(&self) -> f64 {
         self.ordinary_n + self.extra_n + self.gradient_n
     }
@@ -65,7 +65,7 @@ pub struct TruePhysics<'a> {
 }
 
 impl TruePhysics<'_> {
-    /// The line under each car, put together.
+    /// Returns the line under each car, put together.
     pub fn line_under(&self, centre_m: f64) -> LineUnderTrain {
         let track = &self.line.track;
         let mut under = LineUnderTrain::default();
@@ -85,7 +85,7 @@ impl TruePhysics<'_> {
         under
     }
 
-    /// Everything that holds the train back at a speed in m/s.
+    /// Returns everything that holds the train back at a speed in m/s.
     pub fn resistance(
         &self,
         speed_mps: f64,

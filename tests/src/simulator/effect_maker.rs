@@ -41,7 +41,7 @@ pub struct EffectScene<'a> {
 }
 
 impl EffectScene<'_> {
-    /// A resistance by any law outside the library.
+    /// Returns a resistance by any law outside the library.
     pub fn any_law(&self, duration_s: f64, random: &mut SimulatorRandom) -> TrueEffect {
         let sizes = (self.train.handling.speed_max_mps, self.train.ordinary_w0_n_per_kn());
         let degc = self.plans.iter().map(|plan| plan.temperature_degc);
@@ -84,7 +84,7 @@ impl EffectScene<'_> {
         chosen
     }
 
-    /// The chainage in m among `count` random ones that most runs pass.
+    /// Returns the chainage in m among `count` random ones that most runs pass.
     fn busy_place_m(&self, margin_m: f64, count: usize, random: &mut SimulatorRandom) -> f64 {
         let passes = |place_m: f64| self.plans.iter().filter(|plan| plan.covers(place_m)).count();
         let candidates: Vec<f64> = (0..count)
@@ -205,7 +205,7 @@ fn brake_delay(random: &mut SimulatorRandom) -> TrueEffect {
     }
 }
 
-/// A bus that is late, a filter, or both; 0.4 to 1 s together.
+/// Returns a bus that is late, a filter, or both; 0.4 to 1 s together.
 fn speed_delay(random: &mut SimulatorRandom) -> TrueEffect {
     let late_s = random.uniform(0.4, 1.0);
     let share = random.pick(&[0.0, 0.5, 1.0]);

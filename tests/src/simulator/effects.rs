@@ -152,7 +152,7 @@ pub enum TrueEffect {
 }
 
 impl TrueEffect {
-    /// The kind by which `dynocar explain` should name it.
+    /// Returns the kind by which `dynocar explain` should name it.
     pub fn kind(&self) -> EffectKind {
         match self {
             TrueEffect::TunnelDrag { .. } => EffectKind::TunnelDrag,
@@ -179,7 +179,7 @@ impl TrueEffect {
         }
     }
 
-    /// The same with windows that end with their runs, given each run's length in s.
+    /// Returns the same with windows that end with their runs, given each run's length in s.
     #[must_use]
     pub fn ended_with_runs(mut self, lengths_s: &[f64]) -> Self {
         let end =
@@ -245,7 +245,7 @@ impl TrueEffect {
         }
     }
 
-    /// Where it acts, by the names that `dynocar explain --json` uses.
+    /// Returns where it acts, by the names that `dynocar explain --json` uses.
     pub fn place(&self, time_offset_s: f64) -> Value {
         match self {
             TrueEffect::DraggingBrake { windows, .. } => json!({
@@ -283,7 +283,7 @@ fn window_json(window: &TrueRunWindow, time_offset_s: f64) -> Map<String, Value>
     entry
 }
 
-/// Name of a run's file, by the run's number from 0.
+/// Returns the name of a run's file, by the run's number from 0.
 pub fn run_file(number: usize) -> String {
     format!("runs/{:02}.csv", number + 1)
 }

@@ -28,7 +28,7 @@ pub struct Position {
     pub altitude_m: f64,
 }
 
-/// The alignment of a line on a plane: east, north and height in m every 5 m. Curves turn left and right
+/// Returns the alignment of a line on a plane: east, north and height in m every 5 m. Curves turn left and right
 /// in turns.
 pub fn alignment_m(line: &SimulatedLine) -> Vec<[f64; 3]> {
     let track = &line.track;
@@ -54,7 +54,7 @@ pub fn alignment_m(line: &SimulatedLine) -> Vec<[f64; 3]> {
     alignment
 }
 
-/// A position for each sample: late, with errors that fade, missing in gaps.
+/// Returns a position for each sample: late, with errors that fade, missing in gaps.
 pub fn positions(
     samples: &[TrainSample],
     states: &[TrueState],
@@ -99,7 +99,7 @@ pub fn positions(
         .collect()
 }
 
-/// The cells of a position at the end of a row.
+/// Returns the cells of a position at the end of a row.
 pub fn row_text(position: Option<&Position>, delimiter: &str) -> String {
     match position {
         Some(Position { latitude_deg, longitude_deg, altitude_m }) => format!(

@@ -31,7 +31,7 @@ pub struct SimulatedLine {
 }
 
 impl SimulatedLine {
-    /// The lowest speed limit in m/s anywhere under a train.
+    /// Returns the lowest speed limit in m/s anywhere under a train.
     pub fn limit_under_mps(&self, centre_m: f64, train_length_m: f64) -> f64 {
         let (rear_m, front_m) = (centre_m - 0.5 * train_length_m, centre_m + 0.5 * train_length_m);
         let first = self.limits.partition_point(|limit| limit.start_m <= rear_m).max(1) - 1;

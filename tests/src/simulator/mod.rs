@@ -8,15 +8,15 @@
 //!
 //! # Layout
 //!
-//! - [`settings`]: what is asked of a dataset; [`random`]: a stream of numbers per subject
-//! - [`train_maker`], [`line_maker`], [`run_maker`]: what there is
-//! - [`deviations`], [`common_deviations`]: what is a little wrong in everything declared
+//! - [`settings`]: the requested dataset; [`random`]: a stream of numbers per subject
+//! - [`train_maker`], [`line_maker`], [`run_maker`]: train, line and runs
+//! - [`deviations`], [`common_deviations`]: small errors of all declarations
 //! - [`effects`], [`unlisted`], [`effect_maker`], [`disturbances`]: what is undeclared, and what it
 //!   changes
 //! - [`driving`], [`permitted_speed`], [`driver`], [`actuators`], [`dynamics`], [`true_run`],
-//!   [`couplings`]: what happens
-//! - [`sensors`], [`defects`], [`gnss`]: what is recorded of it
-//! - [`truth`], [`oracle`]: what a perfect explainer would find, and how well it would predict
+//!   [`couplings`]: driving and motion
+//! - [`sensors`], [`defects`], [`gnss`]: the recording
+//! - [`truth`], [`oracle`]: the findings of a perfect explainer, and its prediction error
 //! - [`columns`], [`dataset_writer`]: the recording as a dataset folder
 
 pub mod actuators;
@@ -102,12 +102,12 @@ pub struct SimulatedDataset {
 }
 
 impl SimulatedDataset {
-    /// The declared train.
+    /// Returns the declared train.
     pub fn declared_train(&self) -> &TrainModel {
         &self.train.declared
     }
 
-    /// The declared track.
+    /// Returns the declared track.
     pub fn track(&self) -> &Track {
         &self.line.track
     }

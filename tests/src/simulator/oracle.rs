@@ -1,4 +1,4 @@
-//! How well the true parameters, in the terms of the effect library, predict a dataset.
+//! Prediction of a dataset by the true parameters, in the terms of the effect library.
 //!
 //! The oracle sees the recorded samples only, but knows the effects. What it cannot know is noise,
 //! gusts, and what the declared form leaves out (each car's own mass, the odometer's error).
@@ -70,7 +70,7 @@ fn error(recording: &OpenLoopRecording, model: &impl ForceModel, restart: Restar
     SpeedError::of(recording, &prediction)
 }
 
-/// A run's samples as the program under test resolves them.
+/// Returns a run's samples as the program under test resolves them.
 ///
 /// # Panics
 ///
@@ -107,7 +107,7 @@ impl ForceModel for OracleForces {
     }
 }
 
-/// The true model of a run, put together from its samples and its effects.
+/// Returns the true model of a run, put together from its samples and its effects.
 pub fn oracle_forces(
     dataset: &SimulatedDataset,
     run: &SimulatedRun,
@@ -196,7 +196,7 @@ fn extra_n_per_kn(
     [constant - davis.a, linear - davis.b, quadratic - davis.c]
 }
 
-/// Traction minus brake in N that acts behind the reported forces, at each sample.
+/// Returns the traction minus brake in N that acts behind the reported forces, at each sample.
 fn acting_forces_n(recording: &OpenLoopRecording, disturbances: &Disturbances) -> Vec<f64> {
     let mut late = DelayLine::new(disturbances.delay_s, disturbances.lag_s);
     let [brake_delay_s, brake_lag_s] = disturbances.brake_late_s;

@@ -32,7 +32,7 @@ pub struct PermittedLeg {
 }
 
 impl PermittedSpeed {
-    /// The profile of a leg.
+    /// Returns the profile of a leg.
     pub fn new(line: &SimulatedLine, leg: &PermittedLeg) -> Self {
         let spacing_m = 4.0;
         let count = ((leg.to_m - leg.from_m) / spacing_m).ceil().max(1.0) as usize;

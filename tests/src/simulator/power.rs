@@ -37,7 +37,7 @@ impl TrueDrive {
     }
 }
 
-/// The files of a dataset of which power is recorded in place of forces: every brake feeds back.
+/// Returns the files of a dataset of which power is recorded in place of forces: every brake feeds back.
 pub fn power_files(dataset: &SimulatedDataset, drive: &TrueDrive) -> Vec<FileText> {
     let mut random = SimulatorRandom::new(dataset.settings.seed, Stream::Files);
     let mut manifest = format!(

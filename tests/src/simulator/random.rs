@@ -77,7 +77,7 @@ pub struct SimulatorRandom {
 }
 
 impl SimulatorRandom {
-    /// The stream of a subject under a seed.
+    /// Returns the stream of a subject under a seed.
     pub fn new(seed: u64, stream: Stream) -> Self {
         let mut generator = ChaCha8Rng::seed_from_u64(seed);
         generator.set_stream(stream.number());
@@ -89,7 +89,7 @@ impl SimulatorRandom {
         low + (high - low) * self.generator.random::<f64>()
     }
 
-    /// Standard normal (Box-Muller).
+    /// Returns the standard normal (Box-Muller).
     pub fn gaussian(&mut self) -> f64 {
         if let Some(spare) = self.spare_gaussian.take() {
             return spare;
@@ -100,7 +100,7 @@ impl SimulatorRandom {
         radius * cosine
     }
 
-    /// A whole number from `low` to `high`, both included.
+    /// Returns a whole number from `low` to `high`, both included.
     pub fn integer(&mut self, low: usize, high: usize) -> usize {
         self.generator.random_range(low..=high)
     }

@@ -1,4 +1,4 @@
-//! Which runs are made: direction, load, stops, weather and manner of driving.
+//! The plan of the runs: direction, load, stops, weather and manner of driving.
 
 use super::effects::run_file;
 use super::line_maker::SimulatedLine;
@@ -45,7 +45,7 @@ pub struct RunPlan {
 }
 
 impl RunPlan {
-    /// Name of the run's file within a dataset.
+    /// Returns the name of the run's file within a dataset.
     pub fn file(&self) -> String {
         run_file(self.number)
     }
@@ -55,7 +55,7 @@ impl RunPlan {
         rounded(self.mass_kg, 100.0)
     }
 
-    /// True when the run passes or stops at a chainage in m.
+    /// Returns whether the run passes or stops at a chainage in m.
     pub fn covers(&self, chainage_m: f64) -> bool {
         let end_m = self.stops_m.last().copied().unwrap_or(self.start_m);
         (self.start_m.min(end_m)..=self.start_m.max(end_m)).contains(&chainage_m)

@@ -35,13 +35,13 @@ impl Sensor {
         }
     }
 
-    /// A reading of a true value.
+    /// Returns a reading of a true value.
     pub fn read(&self, truth: f64, random: &mut SimulatorRandom) -> f64 {
         let noise = (self.noise + self.relative_noise * truth.abs()) * random.gaussian();
         self.to_quantum(truth + noise)
     }
 
-    /// A reading of something that is never negative and exactly zero when it is off.
+    /// Returns a reading of something that is never negative and exactly zero when it is off.
     fn read_positive(&self, truth: f64, random: &mut SimulatorRandom) -> f64 {
         let reading = self.read(truth, random).max(0.0);
         if truth == 0.0 { 0.0 } else { reading }
@@ -187,7 +187,7 @@ pub fn measure_run(
         .collect()
 }
 
-/// Speed in m/s that the tacho shows at each true state, noise and steps aside: late, and by its
+/// Returns the speed in m/s that the tacho shows at each true state, noise and steps aside: late, and by its
 /// declared wheel.
 fn shown_speeds_mps(states: &[TrueState], disturbances: &Disturbances) -> Vec<f64> {
     let late = (disturbances.speed_delay_s / TRUE_STEP_S).max(0.0);
@@ -209,7 +209,7 @@ fn shown_speeds_mps(states: &[TrueState], disturbances: &Disturbances) -> Vec<f6
         .collect()
 }
 
-/// Chainage in m that the odometer shows at each true state: counted from the wheel's speed and
+/// Returns the chainage in m that the odometer shows at each true state: counted from the wheel's speed and
 /// corrected at every balise.
 fn read_odometer(
     states: &[TrueState],

@@ -23,7 +23,7 @@ impl TrainType {
     pub const ALL: [TrainType; 4] =
         [TrainType::Freight, TrainType::Regional, TrainType::Metro, TrainType::HighSpeed];
 
-    /// Name for files and people.
+    /// Returns the name for files and people.
     pub const fn name(self) -> &'static str {
         match self {
             TrainType::Freight => "freight",
@@ -54,7 +54,7 @@ impl EffectRequest {
         EffectRequest::Kinds(Vec::new())
     }
 
-    /// The kinds asked for; an exact effect outside the library is [`EffectKind::Unknown`].
+    /// Returns the kinds asked for; an exact effect outside the library is [`EffectKind::Unknown`].
     pub fn kinds(&self) -> Vec<EffectKind> {
         match self {
             EffectRequest::Kinds(kinds) => kinds.clone(),
@@ -205,7 +205,7 @@ impl SimulatorSettings {
         }
     }
 
-    /// The same with ideal sensors, declared Davis coefficients that are the true ones, no
+    /// Returns the same with ideal sensors, declared Davis coefficients that are the true ones, no
     /// deviations and no wheel slip: what is left of an error is the effect's or the predictor's.
     pub fn ideal(seed: u64, effects: EffectRequest) -> Self {
         SimulatorSettings {

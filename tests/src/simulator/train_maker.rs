@@ -57,17 +57,17 @@ pub struct TrueTrain {
 }
 
 impl TrueTrain {
-    /// Unit basic resistance in N/kN at an ordinary speed.
+    /// Returns the unit basic resistance in N/kN at an ordinary speed.
     pub fn ordinary_w0_n_per_kn(&self) -> f64 {
         self.resistance.w0_n_per_kn(0.65 * self.handling.speed_max_mps)
     }
 
-    /// Greatest declared traction force in N at a speed in m/s.
+    /// Returns the greatest declared traction force in N at a speed in m/s.
     pub fn traction_max_n(&self, speed_mps: f64) -> f64 {
         self.declared.traction.as_ref().map_or(0.0, |effort| effort.force_n(speed_mps))
     }
 
-    /// Greatest declared brake force in N at a speed in m/s.
+    /// Returns the greatest declared brake force in N at a speed in m/s.
     pub fn brake_max_n(&self, speed_mps: f64) -> f64 {
         self.declared.brake.as_ref().map_or(0.0, |effort| effort.force_n(speed_mps))
     }
@@ -230,7 +230,7 @@ pub fn make_train(
     TrueTrain { train_type, declared, resistance, cars: cars.2, handling }
 }
 
-/// Mass in kg, length in m and cars; a freight train has its locomotive ahead.
+/// Returns the mass in kg, length in m and cars; a freight train has its locomotive ahead.
 fn make_cars(
     train_type: TrainType,
     ranges: &Ranges,

@@ -11,7 +11,7 @@ use super::oracle::{OracleScore, score};
 const MOVING_MPS: f64 = 0.5;
 
 impl SimulatedDataset {
-    /// The verdict of `dynocar explain` that would be right.
+    /// Returns the verdict of `dynocar explain` that would be right.
     pub fn verdict(&self) -> &'static str {
         if self.effects.is_empty() {
             "none"
@@ -22,7 +22,7 @@ impl SimulatedDataset {
         }
     }
 
-    /// Mean size of the undeclared force over the mean ordinary resistance while moving; zero for
+    /// Returns the mean size of the undeclared force over the mean ordinary resistance while moving; zero for
     /// effects that are no forces.
     pub fn extra_force_share(&self) -> f64 {
         let moving = || {
@@ -34,7 +34,7 @@ impl SimulatedDataset {
         extra_n / ordinary_n
     }
 
-    /// The truth as JSON: verdict, effects in the terms of `dynocar explain --json`, true
+    /// Returns the truth as JSON: verdict, effects in the terms of `dynocar explain --json`, true
     /// resistance, the runs, and the error on the holdout runs of the declared model and of the
     /// true one.
     pub fn truth_json(&self) -> Value {

@@ -75,7 +75,7 @@ pub struct Unlisted {
 }
 
 impl Unlisted {
-    /// The resistance in N/kN.
+    /// Returns the resistance in N/kN.
     pub fn resistance_n_per_kn(&self, around: Around) -> f64 {
         let Around { speed_mps, time_s, degc } = around;
         let share = match self.law {
@@ -103,7 +103,7 @@ impl Unlisted {
         self.n_per_kn * share
     }
 
-    /// The speeds in m/s at which most of it acts, where these are not all.
+    /// Returns the speeds in m/s at which most of it acts, where these are not all.
     pub fn speed_range_mps(&self) -> Option<[f64; 2]> {
         match self.law {
             Law::Band { centre_mps, width_mps } => {

@@ -85,7 +85,7 @@ pub struct SoakScene {
 }
 
 impl SoakScene {
-    /// The scene of a seed and a type of train.
+    /// Returns the scene of a seed and a type of train.
     pub fn new(seed: u64, train_type: TrainType) -> Self {
         let mut settings = SimulatorSettings::new(seed, EffectRequest::none());
         settings.train_type = Some(train_type);
@@ -105,7 +105,7 @@ impl SoakScene {
         SoakScene { data, samples, estimators: default_estimators() }
     }
 
-    /// The same before other estimators than those by default.
+    /// Returns the same before other estimators than those by default.
     pub fn before(self, estimators: Vec<EstimatorSettings>) -> Self {
         SoakScene { estimators, ..self }
     }

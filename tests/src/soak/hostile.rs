@@ -49,7 +49,7 @@ impl SegmentKind {
         }
     }
 
-    /// First byte and end of what is overwritten in a segment of this length.
+    /// Returns the first byte and end of what is overwritten in a segment of this length.
     const fn range(self, length: u64) -> (u64, u64) {
         match self {
             SegmentKind::Payload => (length / 2, length),

@@ -36,7 +36,7 @@ pub struct Programs {
 }
 
 impl Programs {
-    /// The programs in the folder of another one of them.
+    /// Returns the programs in the folder of another one of them.
     pub fn beside(program: &Path) -> Self {
         let folder = program.parent().unwrap_or(Path::new("."));
         Programs {

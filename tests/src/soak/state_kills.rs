@@ -16,7 +16,7 @@ const FILE: &str = "train-1.state";
 /// The writer is killed within this many µs of its first sign of life.
 const KILLED_WITHIN_US: u64 = 8_000;
 
-/// A state that says which one it is: the number stands in every value.
+/// Returns a state that says which one it is: the number stands in every value.
 fn numbered(number: u64) -> StateContent {
     // Lengths differ, so that a file mixed from two would show.
     let estimate = |pipeline: u64| StoredEstimate {
@@ -48,7 +48,7 @@ pub fn write_for_ever(folder: &Path) {
     }
 }
 
-/// The number of the state in a file; `None` when there is none yet.
+/// Returns the number of the state in a file; `None` when there is none yet.
 fn read_number(path: &Path) -> Result<Option<u64>, String> {
     let Some(text) = file::read(path).map_err(|error| error.to_string())? else { return Ok(None) };
     let content = StateContent::from_text(path, &text).map_err(|error| error.to_string())?;

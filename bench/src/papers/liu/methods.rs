@@ -99,7 +99,7 @@ impl Method {
     }
 }
 
-/// The recursion of section 3; with a limit, the instants t_s at which it updates are those
+/// Returns the recursion of section 3; with a limit, the instants t_s at which it updates are those
 /// whose newest p innovations are all good.
 fn recursion(segments: &[Segment], length: usize, bad_beyond: Option<f64>) -> Option<Vector3<f64>> {
     let start = Vector3::repeat(1.0 / START_VARIANCE);

@@ -1,4 +1,5 @@
-//! Liu's coasting runs, with what the paper leaves out, and the Cramér-Rao bound, computed.
+//! Liu's coasting runs, with assumptions for the conditions that the paper leaves open, and the Cramér-Rao bound,
+//! computed.
 //!
 //! The speeds are noisy, sometimes wild, and rounded: a sample is the number of the step that it
 //! falls on. Its Fisher information about the true speed is the sum over steps of
@@ -58,7 +59,7 @@ pub struct MeasuredRun {
     pub speed_kmh: f64,
 }
 
-/// The true coefficients, for speeds in m/s.
+/// Returns the true coefficients, for speeds in m/s.
 pub fn truth() -> Davis {
     davis(THETA_KMH)
 }
@@ -84,7 +85,7 @@ pub fn true_speeds_kmh((from_kmh, to_kmh): (f64, f64), davis: &Davis) -> Vec<f64
     speeds
 }
 
-/// The measured runs of a seed.
+/// Returns the measured runs of a seed.
 pub fn measure(condition: RunCondition, seed: u64) -> Vec<Vec<MeasuredRun>> {
     let mut random = Chance::new(seed);
     RUNS_KMH
@@ -110,7 +111,7 @@ pub fn measure(condition: RunCondition, seed: u64) -> Vec<Vec<MeasuredRun>> {
         .collect()
 }
 
-/// The speeds in m/s at which w0 is compared: where the runs coast.
+/// Returns the speeds in m/s at which w0 is compared: where the runs coast.
 pub fn compared_speeds_mps() -> Vec<f64> {
     (40..=72).map(|kmh| f64::from(kmh) / 3.6).collect()
 }
@@ -142,7 +143,7 @@ fn sample_information(outlier_share: f64) -> f64 {
 /// Half the difference of speeds in km/h that a slope is taken over.
 const WIDTH_KMH: f64 = 1e-4;
 
-/// Probability that the error before rounding lies below `error_kmh`.
+/// Returns the probability that the error before rounding lies below `error_kmh`.
 fn distribution(error_kmh: f64, outlier_share: f64) -> f64 {
     let sound = Normal::standard().cdf(error_kmh / NOISE_KMH);
     // An outlier is the noise moved by a size between two bounds, up or down.
@@ -153,7 +154,7 @@ fn distribution(error_kmh: f64, outlier_share: f64) -> f64 {
     (1.0 - outlier_share) * sound + outlier_share * 0.5 * (up + down)
 }
 
-/// The integral of the standard normal distribution up to x.
+/// Returns the integral of the standard normal distribution up to x.
 fn normal_integral(x: f64) -> f64 {
     x * Normal::standard().cdf(x) + Normal::standard().pdf(x)
 }

@@ -22,7 +22,7 @@ pub struct FisherInformation {
 }
 
 impl FisherInformation {
-    /// The Fisher information of a drive, every sample of which has white Gaussian noise of the
+    /// Returns the Fisher information of a drive, every sample of which has white Gaussian noise of the
     /// sensor's variance; the speed at the start of each leg is unknown.
     ///
     /// The sensitivities S of the speed obey S' = ∂a/∂v S + ∂a/∂theta along the true motion.
@@ -35,19 +35,19 @@ impl FisherInformation {
         FisherInformation { matrix: total, basis }
     }
 
-    /// Least standard deviation of the mass, relative, when all resistances are known.
+    /// Returns the least standard deviation of the mass, relative, when all resistances are known.
     pub fn mass_std(&self) -> f64 {
         self.matrix[(0, 0)].powf(-0.5)
     }
 
-    /// The same with a constant acceleration of unknown size besides the known forces.
+    /// Returns the same with a constant acceleration of unknown size besides the known forces.
     pub fn mass_std_with_bias(&self) -> f64 {
         // The constant is what the first polynomial of z1 multiplies.
         let (own, cross, other) = (self.matrix[(0, 0)], self.matrix[(0, 1)], self.matrix[(1, 1)]);
         (own - cross * cross / other).powf(-0.5)
     }
 
-    /// Least root mean square error in N/kN of z1, z2 or z3 over some speeds in m/s, the mass
+    /// Returns the least root mean square error in N/kN of z1, z2 or z3 over some speeds in m/s, the mass
     /// known.
     pub fn resistance_std(&self, section: usize, speeds_mps: &[f64]) -> f64 {
         let own = self.matrix.fixed_view::<9, 9>(1, 1).into_owned();

@@ -1,4 +1,4 @@
-//! Figure 10: what the learned mass does to the traction energy of a leg.
+//! Figure 10: the effect of the learned mass on the traction energy of a leg.
 //!
 //! The empty train of 110 t runs from the second station to the first. Its controller plans a
 //! speed profile over the place and computes the force from an assumed mass: 117.1 t, as if the
@@ -41,7 +41,7 @@ struct Driven {
     time_s: f64,
 }
 
-/// The rows for energy.
+/// Returns the rows for energy.
 pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     let shuttle = Shuttle::new(false);
     let seeds = seeds.at_most(20);
@@ -62,7 +62,7 @@ pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     rows
 }
 
-/// Energy saved against a case, and how much later the train arrives.
+/// Returns the energy saved against a case, and how much later the train arrives.
 fn comparison(
     shuttle: &Shuttle,
     text: &str,
@@ -96,7 +96,7 @@ fn comparison(
     ]
 }
 
-/// Energy in J of a case at a running time, from a straight line through the logarithms of
+/// Returns the energy in J of a case at a running time, from a straight line through the logarithms of
 /// energy and time at 41 cruising speeds; single runs scatter with the sample at which the
 /// brake is applied.
 fn energy_at_time(shuttle: &Shuttle, case: &Case, time_s: f64) -> f64 {
@@ -141,7 +141,7 @@ fn traction_energy_j(ride: &[ShuttleMoment]) -> f64 {
     ride.windows(2).map(work_j).sum()
 }
 
-/// A controller that follows the plan from station to station.
+/// Returns a controller that follows the plan from station to station.
 fn plan_follower(case: Case, cruise_mps: f64) -> impl FnMut(&Shuttle, &ShuttleMoment, f64) -> f64 {
     let mut is_stopping = false;
     move |shuttle, now, to_m| {

@@ -42,7 +42,7 @@ impl Condition {
 /// to 3 %.
 const LEGS_PER_SEED: usize = 5;
 
-/// The rows for mass.
+/// Returns the rows for mass.
 pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     let (shuttle, legs) = (Shuttle::new(false), seeds.each(LEGS_PER_SEED));
     let calm_leg = |mass_kg| leg(&shuttle, mass_kg, &mut calm);
@@ -97,13 +97,13 @@ pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     rows
 }
 
-/// A row without figures.
+/// Returns a row without figures.
 fn row(quantity: &str, seeds: Seeds) -> PaperRow {
     let note = "paper's method: force on differentiated speed; baseline: the reverse";
     PaperRow::new(WANG, "Table 3", quantity, "%", seeds).noted(note)
 }
 
-/// The whole chain: resistances from one crossing, then the mass with them.
+/// Returns the whole chain: resistances from one crossing, then the mass with them.
 fn after_crossing(shuttle: &Shuttle, mass_kg: f64, seeds: Seeds) -> PaperScore {
     let crossing = shuttle.crossing(CROSSING, &mut calm);
     let ride = there_and_back(shuttle, mass_kg, &mut calm);
@@ -166,7 +166,7 @@ fn take(
     score.take(percent(estimate_kg), 100.0 * std_kg / mass_kg);
 }
 
-/// A change of mass at a stop: seconds under force until the error stays below 1 %.
+/// Returns a change of mass at a stop: seconds under force until the error stays below 1 %.
 fn step_row(shuttle: &Shuttle, seeds: Seeds) -> PaperRow {
     let loaded_kg = 1.12 * EMPTY_MASS_KG;
     let ride = there_and_back(shuttle, loaded_kg, &mut calm);
@@ -205,7 +205,7 @@ fn step_row(shuttle: &Shuttle, seeds: Seeds) -> PaperRow {
     }
 }
 
-/// Seconds of updates until the error stays below 1 %; `None` when it never does.
+/// Returns the seconds of updates until the error stays below 1 %; `None` when it never does.
 fn settling_s(
     samples: &[ResolvedSample],
     truth_kg: f64,

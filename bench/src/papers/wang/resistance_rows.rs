@@ -25,7 +25,7 @@ pub const CROSSING: usize = 28_000;
 
 const NAMES: [&str; 3] = ["basic resistance z1", "curve resistance z2", "tunnel resistance z3"];
 
-/// The rows for resistance.
+/// Returns the rows for resistance.
 pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     let shuttle = Shuttle::new(false);
     let ride = shuttle.crossing(CROSSING, &mut calm);
@@ -59,7 +59,7 @@ fn curve_in_tunnel_row(seeds: Seeds) -> PaperRow {
     PaperRow { bound: Some(bound), ..score.row(row(&what, seeds)) }
 }
 
-/// A row without figures.
+/// Returns a row without figures.
 fn row(what: &str, seeds: Seeds) -> PaperRow {
     let quantity = format!("{what}, error over the speeds driven there");
     PaperRow::new(WANG, "Table 2", quantity, "N/kN", seeds).noted(
@@ -96,13 +96,13 @@ fn run(
     scores
 }
 
-/// Our estimator with its default settings: the mass is not known to it.
+/// Returns our estimator with its default settings: the mass is not known to it.
 pub fn joint_least_squares(shuttle: &Shuttle) -> JointLeastSquares {
     let settings = JointLeastSquaresSettings::default();
     JointLeastSquares::new(settings, &shuttle.train).expect("default settings")
 }
 
-/// The rows that show the printed learning rate to fail.
+/// Returns the rows that show the printed learning rate to fail.
 fn printed_rows(shuttle: &Shuttle, ride: &[ShuttleMoment], seeds: Seeds) -> [PaperRow; 2] {
     let (mut until, mut moved) = (Vec::new(), Vec::new());
     for seed in seeds.range() {

@@ -1,5 +1,5 @@
-//! Rides on the line: how the train is driven, what acts on it that is not in the model, what the controller measures
-//! of it, and the estimators that learn the mass on a leg.
+//! Rides on the line: driving, forces that the model lacks, the controller's measurements, and the estimators that
+//! learn the mass on a leg.
 
 use dynocar_core::pipeline::Outcome;
 use dynocar_core::pipeline::admission::Admission;
@@ -53,7 +53,7 @@ fn limit_driver() -> impl FnMut(&Shuttle, &ShuttleMoment, f64) -> f64 {
     }
 }
 
-/// Greatest deceleration in m/s² that a lower limit ahead asks for, and the limit here in m/s.
+/// Returns the greatest deceleration in m/s² that a lower limit ahead asks for, and the limit here in m/s.
 fn limit_need(now: &ShuttleMoment) -> (f64, f64) {
     let mut needed = 0.0_f64;
     let mut here_mps = f64::INFINITY;
@@ -159,7 +159,7 @@ impl Shuttle {
     }
 }
 
-/// The leg of 3 km from the first station: power, coasting around 80 km/h, braking.
+/// Returns the leg of 3 km from the first station: power, coasting around 80 km/h, braking.
 pub fn leg(
     shuttle: &Shuttle,
     mass_kg: f64,
@@ -168,7 +168,7 @@ pub fn leg(
     shuttle.drive(&shuttle.standing_at(STATIONS_M[0], mass_kg), STATIONS_M[1], 10.0, disturbance)
 }
 
-/// The empty train comes to the first station, a load changes it, and it runs the leg.
+/// Returns the empty train comes to the first station, a load changes it, and it runs the leg.
 ///
 /// On the way there the filter learns the noise of the speed; the mass of the leg it has to
 /// learn anew.
@@ -185,7 +185,7 @@ pub fn there_and_back(
     ride
 }
 
-/// The resistances that act.
+/// Returns the resistances that act.
 pub fn known_resistance(shuttle: &Shuttle) -> LineResistance {
     let [basic, curve, tunnel] = shuttle.truth;
     let (curve, tunnel) = (Some(curve), Some(tunnel));
@@ -206,14 +206,14 @@ impl AdmittedKalman {
     }
 }
 
-/// Our filter with a resistance.
+/// Returns our filter with a resistance.
 pub fn kalman(shuttle: &Shuttle, resistance: &LineResistance) -> AdmittedKalman {
     let settings = MassKalmanSettings::default().with_resistance(resistance);
     let filter = MassKalman::new(settings, &shuttle.train).expect("default settings");
     AdmittedKalman { admission: Admission::new(TrainId(1), shuttle.train.clone()), filter }
 }
 
-/// The paper's last stage with a resistance.
+/// Returns the paper's last stage with a resistance.
 pub fn staged(
     shuttle: &Shuttle,
     mass_regression: MassRegression,
@@ -246,7 +246,7 @@ pub fn wind(quadratic: f64, seed: u64) -> impl FnMut(f64) -> f64 {
     }
 }
 
-/// An unexplained acceleration drawn from what the mass filter presumes: one of its behaviours,
+/// Returns an unexplained acceleration drawn from what the mass filter presumes: one of its behaviours,
 /// all alike likely; seeds in a row take the behaviours in turn.
 pub fn presumed(seed: u64) -> impl FnMut(f64) -> f64 {
     let models = MassKalmanSettings::default().bias_models();
@@ -265,12 +265,12 @@ const SPEED_STD_MPS: f64 = 0.05 / 3.6;
 /// Step of the speed's digits in m/s: 0.1 km/h.
 const SPEED_QUANTUM_MPS: f64 = 0.1 / 3.6;
 
-/// Variance in (m/s)² of a measured speed: sensor and rounding.
+/// Returns the variance in (m/s)² of a measured speed: sensor and rounding.
 pub fn speed_variance() -> f64 {
     SPEED_STD_MPS * SPEED_STD_MPS + SPEED_QUANTUM_MPS * SPEED_QUANTUM_MPS / 12.0
 }
 
-/// The samples of a drive with noise and rounding, through validation and force resolution.
+/// Returns the samples of a drive with noise and rounding, through validation and force resolution.
 pub fn measure(
     shuttle: &Shuttle,
     ride: &[ShuttleMoment],

@@ -68,13 +68,13 @@ pub struct ShuttleMoment {
 /// m/s, asked for once a period.
 pub type DisturbanceLaw<'a> = dyn FnMut(f64) -> f64 + 'a;
 
-/// Nothing beyond the model.
+/// Returns nothing beyond the model.
 pub fn calm(_speed_mps: f64) -> f64 {
     0.0
 }
 
 impl Shuttle {
-    /// The scenario's train and line; `curve_in_tunnel` adds a curve inside the middle tunnel.
+    /// Returns the scenario's train and line; `curve_in_tunnel` adds a curve inside the middle tunnel.
     pub fn new(curve_in_tunnel: bool) -> Self {
         let effort: Vec<(f64, f64)> = (0..=22)
             .map(|k| {
@@ -109,13 +109,13 @@ impl Shuttle {
         [1.0, CURVE_RADIUS_M * curvature, tunnel]
     }
 
-    /// A figure of z1, z2 and z3, summed by the shares of a train at a chainage in m.
+    /// Returns a figure of z1, z2 and z3, summed by the shares of a train at a chainage in m.
     pub fn sum(&self, position_m: f64, of: impl Fn(&Davis) -> f64) -> f64 {
         let shares = self.shares(position_m);
         self.truth.iter().zip(shares).map(|(davis, share)| share * of(davis)).sum()
     }
 
-    /// Acceleration in m/s² with `extra` N/kN of resistance.
+    /// Returns the acceleration in m/s² with `extra` N/kN of resistance.
     pub fn acceleration_mps2(&self, at: &ShuttleMoment, extra_n_per_kn: f64) -> f64 {
         let gradient = self.track.gradient_permille(at.position_m, self.train.length_m);
         let w = self.sum(at.position_m, |davis| davis.w0_n_per_kn(at.speed_mps))
@@ -147,7 +147,7 @@ impl Shuttle {
         at(PERIOD_S, end)
     }
 
-    /// The train at rest.
+    /// Returns the train at rest.
     pub fn standing_at(&self, position_m: f64, mass_kg: f64) -> ShuttleMoment {
         ShuttleMoment {
             time_s: 0.0,

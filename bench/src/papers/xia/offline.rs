@@ -115,7 +115,7 @@ pub fn convergence_rows(seeds: Seeds) -> Vec<PaperRow> {
     rows
 }
 
-/// Error in a without noise: the paper's method where it converges, ours from integral least
+/// Returns the error in a without noise: the paper's method where it converges, ours from integral least
 /// squares; the runs differ in line and driver.
 pub fn noise_free_rows(seeds: Seeds) -> Vec<PaperRow> {
     let mut rows = Vec::new();

@@ -33,7 +33,7 @@ const SWITCHES: [(usize, f64); 3] = [(220, 0.1), (520, 0.1), (820, 1.0)];
 /// Steps within which a method must settle.
 const SETTLING_MAX: usize = 80;
 
-/// The truth of Table 4 by chainage in m.
+/// Returns the truth of Table 4 by chainage in m.
 fn table_4(chainage_m: f64) -> Davis {
     let (a, b, c) = match chainage_m / 1000.0 {
         km if km < 22.0 => (0.79, 0.002288, 0.001368),
@@ -86,7 +86,7 @@ fn ours(run: &NoiseFreeRun, speeds_mps: &[f64], settings: OnlineSettings) -> Est
         .collect()
 }
 
-/// The bound: a single filter that is given the noise by step, that the forces are exact, and
+/// Returns the bound: a single filter that is given the noise by step, that the forces are exact, and
 /// where the coefficients switch.
 fn informed(
     run: &NoiseFreeRun,
@@ -119,7 +119,7 @@ fn informed(
         .collect()
 }
 
-/// The paper: Algorithm 1 over the newest 20 steps, each window from the answer of the one
+/// Returns the paper: Algorithm 1 over the newest 20 steps, each window from the answer of the one
 /// before.
 fn paper(run: &NoiseFreeRun, speeds_mps: &[f64], seed: u64) -> Estimates {
     let mut source = RestartSource::new(seed);
@@ -176,7 +176,7 @@ impl Following {
         }
     }
 
-    /// The mean settling after the switches without noise, and after the one with noise.
+    /// Returns the mean settling after the switches without noise, and after the one with noise.
     fn settling_km(&self) -> [f64; 2] {
         let [one, other, noisy] = self.settling_km.each_ref().map(mean);
         [0.5 * (one + other), noisy]
@@ -223,7 +223,7 @@ pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     ]
 }
 
-/// Mean and standard deviations that the constant truths are drawn from.
+/// Returns the mean and standard deviations that the constant truths are drawn from.
 fn constant_prior() -> (Davis, Vector3<f64>) {
     (CASES[0], Vector3::new(0.3, 0.01, 0.0003))
 }
@@ -239,7 +239,7 @@ fn drawn((mean, std): (Davis, Vector3<f64>), random: &mut Chance) -> Davis {
 /// Truth, estimate and bound of a run with coefficients drawn from [`constant_prior`].
 type Drawn = Option<(Davis, (Davis, Matrix3<f64>), Matrix3<f64>)>;
 
-/// A row over seeds that draw the coefficients of a run without a switch.
+/// Returns a row over seeds that draw the coefficients of a run without a switch.
 fn drawn_row(
     quantity: &str,
     speeds_mps: &[f64],
@@ -257,7 +257,7 @@ fn drawn_row(
     score.row(PaperRow::new(XIA, "Table 4", quantity, "N/kN", seeds))
 }
 
-/// A full speed profile; the forces are exact, as the filter is set to assume.
+/// Returns a full speed profile; the forces are exact, as the filter is set to assume.
 fn exact_forces_row(seeds: Seeds) -> PaperRow {
     let (mean_davis, std) = constant_prior();
     let quantity = "online, no switch: w0 over 30-300 km/h after a full profile of 40 km";

@@ -1,5 +1,5 @@
-//! Seeded runs of the CRH380C of Xia 2023 with what the paper leaves out (line, forces, noise), and the Cramér-Rao
-//! bound from a run's own numerical Jacobian.
+//! Seeded runs of the CRH380C of Xia 2023 with assumptions for the conditions that the paper leaves open (line, forces,
+//! noise), and the Cramér-Rao bound from a run's own numerical Jacobian.
 //!
 //! M = 981.7 t, γ = 0.06, traction up to min(520, 18240 / v) kN, 100 m sampling, white noise of
 //! 0.18 m/s on the speed (a mean square of 0.05 at the truth, the paper's ε1, leaves room for
@@ -43,12 +43,12 @@ pub const CASES: [Davis; 4] = [
     Davis { a: 0.3488, b: 0.0596, c: 0.00112 },
 ];
 
-/// The speeds in m/s of cruise at which w0 is compared.
+/// Returns the speeds in m/s of cruise at which w0 is compared.
 pub fn fast_speeds_mps() -> Vec<f64> {
     (0..=7).map(|i| (270.0 + 5.0 * f64::from(i)) * KMH).collect()
 }
 
-/// The speeds in m/s of a full profile at which w0 is compared.
+/// Returns the speeds in m/s of a full profile at which w0 is compared.
 pub fn all_speeds_mps() -> Vec<f64> {
     (1..=10).map(|i| 30.0 * f64::from(i) * KMH).collect()
 }
@@ -72,7 +72,7 @@ pub struct NoiseFreeRun {
 }
 
 impl NoiseFreeRun {
-    /// The speeds with white noise from a step on.
+    /// Returns the speeds with white noise from a step on.
     pub fn measured_mps(&self, noisy_from: usize, random: &mut Chance) -> Vec<f64> {
         let noise = |i: usize, random: &mut Chance| {
             if i >= noisy_from { SPEED_NOISE_MPS * random.normal() } else { 0.0 }
@@ -80,7 +80,7 @@ impl NoiseFreeRun {
         self.speeds_mps.iter().enumerate().map(|(i, v)| v + noise(i, random)).collect()
     }
 
-    /// The same reported forces, with a disturbance of the resistance that nobody reports: a
+    /// Returns the same reported forces, with a disturbance of the resistance that nobody reports: a
     /// first-order autoregression of [`DISTURBANCE_N_PER_KN`] and [`DISTURBANCE_S`].
     pub fn disturbed(&self, davis: &Davis, random: &mut Chance) -> NoiseFreeRun {
         let mut speeds_mps = vec![self.speeds_mps[0]];
@@ -96,13 +96,13 @@ impl NoiseFreeRun {
     }
 }
 
-/// The speed after a step by eq. 7; the truth's own formula, apart from the estimators'.
+/// Returns the speed after a step by eq. 7; the truth's own formula, apart from the estimators'.
 fn next_speed_mps(step: &TrajectoryStep, davis: &Davis, speed_mps: f64) -> f64 {
     let resistance = step.resistance_gain * davis.w0_n_per_kn(speed_mps);
     (speed_mps * speed_mps + 2.0 * step.size * (step.drive_mps2 - resistance)).sqrt()
 }
 
-/// Speeds in m/s along steps from an initial speed.
+/// Returns the speeds in m/s along steps from an initial speed.
 pub fn speeds_mps(steps: &[TrajectoryStep], initial_mps: f64, davis: &Davis) -> Vec<f64> {
     let mut speeds = Vec::with_capacity(steps.len() + 1);
     speeds.push(initial_mps);
@@ -227,13 +227,13 @@ impl Driver {
     }
 }
 
-/// Least covariance of (a, b, c) that an unbiased estimator can have from a run's speeds with
+/// Returns the least covariance of (a, b, c) that an unbiased estimator can have from a run's speeds with
 /// white noise, when the initial speed is not known either.
 pub fn davis_covariance(run: &NoiseFreeRun, davis: &Davis) -> Matrix3<f64> {
     covariance(jacobian(run, davis)) * SPEED_NOISE_MPS.powi(2)
 }
 
-/// The same where the resistance is disturbed as in [`NoiseFreeRun::disturbed`] and the disturbance's
+/// Returns the same where the resistance is disturbed as in [`NoiseFreeRun::disturbed`] and the disturbance's
 /// strength and correlation are known: generalised least squares.
 pub fn disturbed_davis_covariance(run: &NoiseFreeRun, davis: &Davis) -> Matrix3<f64> {
     let rows = jacobian(run, davis);
@@ -257,7 +257,7 @@ pub fn disturbed_davis_covariance(run: &NoiseFreeRun, davis: &Davis) -> Matrix3<
     covariance(whitened.row_iter().map(|row| [row[0], row[1], row[2], row[3]]))
 }
 
-/// Derivatives of every speed with respect to v_0, a, b and c, by central differences of the
+/// Returns the derivatives of every speed with respect to v_0, a, b and c, by central differences of the
 /// truth's own recursion rather than by the derivatives that the estimators use.
 fn jacobian(run: &NoiseFreeRun, davis: &Davis) -> Vec<[f64; 4]> {
     statistics::jacobian([1e-4, 1e-4, 1e-6, 1e-8], |[dv, da, db, dc]| {
@@ -266,7 +266,7 @@ fn jacobian(run: &NoiseFreeRun, davis: &Davis) -> Vec<[f64; 4]> {
     })
 }
 
-/// Derivatives of every speed with respect to 1 N/kN of resistance during each step.
+/// Returns the derivatives of every speed with respect to 1 N/kN of resistance during each step.
 fn effects(run: &NoiseFreeRun, davis: &Davis) -> DMatrix<f64> {
     let width = 1e-4;
     let count = run.speeds_mps.len();

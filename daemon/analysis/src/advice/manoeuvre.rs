@@ -27,7 +27,7 @@ pub struct Scene<'a> {
 }
 
 impl<'a> Scene<'a> {
-    /// A train whose highest speed is that of its effort curves, lower where its traction no longer
+    /// Returns a train whose highest speed is that of its effort curves, lower where its traction no longer
     /// overcomes its resistance; without curves the highest that was driven, `speed_seen_mps`.
     pub fn new(train: &'a TrainModel, davis: Davis, mass_kg: f64, speed_seen_mps: f64) -> Self {
         let speed_max_mps =
@@ -62,7 +62,7 @@ impl<'a> Scene<'a> {
         self.mass_kg * (1.0 + self.train.rotating_mass_factor)
     }
 
-    /// Every manoeuvre that the train can drive within a time in s.
+    /// Returns every manoeuvre that the train can drive within a time in s.
     pub fn catalogue(&self, within_s: f64) -> Vec<PlannedManoeuvre> {
         let top_mps = self.speed_max_mps.floor();
         let mut speeds: Vec<f64> =
@@ -151,7 +151,7 @@ impl PlannedManoeuvre {
 }
 
 impl ManoeuvreDriver {
-    /// Traction minus brake in N at a speed; `None` when the manoeuvre is over.
+    /// Returns the traction minus brake in N at a speed; `None` when the manoeuvre is over.
     pub fn force_n(&mut self, scene: &Scene<'_>, speed_mps: f64) -> Option<f64> {
         let PlannedManoeuvre { kind, to_mps, .. } = self.drive;
         let full_n = || scene.full_traction_n(speed_mps);

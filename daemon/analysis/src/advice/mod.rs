@@ -75,7 +75,7 @@ pub fn forecasts(
     drives.into_iter().filter_map(|drive| forecast(&scene, &known, noise, drive)).collect()
 }
 
-/// The manoeuvre for the worst-known coefficient; `None` where none of three minutes is worth it.
+/// Returns the manoeuvre for the worst-known coefficient; `None` where none of three minutes is worth it.
 ///
 /// Worst known is the coefficient whose standard deviation makes most of the resistance's at the train's
 /// highest speed. The shortest time in which the best manoeuvre halves its interval is advised, else the
@@ -103,7 +103,7 @@ pub fn for_resistance(
     Some(advice(&chosen, worst, now[worst]))
 }
 
-/// The manoeuvre that narrows the mass most, by a resistance and its covariance; `None` where the mass is
+/// Returns the manoeuvre that narrows the mass most, by a resistance and its covariance; `None` where the mass is
 /// known well enough, or none helps.
 pub fn for_mass(
     snapshot: &ParameterSnapshot,
@@ -139,7 +139,7 @@ fn advice(chosen: &Forecast, index: usize, std_now: f64) -> Advice {
     }
 }
 
-/// The forecast that leaves the least of a coefficient's standard deviation; coasting where it is as good.
+/// Returns the forecast that leaves the least of a coefficient's standard deviation; coasting where it is as good.
 pub fn best(forecasts: &[Forecast], coefficient: usize) -> Option<Forecast> {
     let std = |it: &&Forecast| it.std[coefficient];
     let least = |all: &mut dyn Iterator<Item = &Forecast>| {

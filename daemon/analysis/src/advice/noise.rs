@@ -110,7 +110,7 @@ impl NoiseSeen {
     }
 }
 
-/// Information on a for given b and c, of the pipelines that learn it from every sample.
+/// Returns the information on a for given b and c, of the pipelines that learn it from every sample.
 fn information_on_a(snapshot: &ParameterSnapshot) -> Option<f64> {
     let learns = matches!(
         snapshot.pipeline_kind()?,
@@ -124,7 +124,7 @@ fn information_on_a(snapshot: &ParameterSnapshot) -> Option<f64> {
     information.is_finite().then_some(information)
 }
 
-/// The ninth decile: at other times the growth waits for what the mass, the wind and the scales of the forces
+/// Returns the ninth decile: at other times the growth waits for what the mass, the wind and the scales of the forces
 /// leave open.
 fn fastest(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
@@ -136,7 +136,7 @@ fn fastest(values: &[f64]) -> f64 {
 pub const ANSWERED: [Parameter; 4] =
     [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC, Parameter::Mass];
 
-/// Coefficients and their covariance out of a snapshot that has all three.
+/// Returns the coefficients and their covariance out of a snapshot that has all three.
 pub fn davis_of(snapshot: &ParameterSnapshot) -> Option<(Davis, Matrix3<f64>)> {
     let [davis @ .., _] = ANSWERED;
     let [Some(a), Some(b), Some(c)] = davis.map(|it| snapshot.index_of(it)) else { return None };
@@ -149,7 +149,7 @@ pub fn davis_of(snapshot: &ParameterSnapshot) -> Option<(Davis, Matrix3<f64>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynocar_core::pipeline::estimator::write_parameters;
+    use dynocar_core::pipeline::output::write_parameters;
     use dynocar_model::train::Davis;
     use nalgebra::{Matrix3, Vector3};
 

@@ -192,7 +192,7 @@ impl Random {
         (bits >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// The sum of twelve uniforms: mean 0, variance 1.
+    /// Returns the sum of twelve uniforms: mean 0, variance 1.
     fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }

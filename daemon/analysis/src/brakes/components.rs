@@ -1,4 +1,4 @@
-//! How weak a brake of many units may be, by importance sampling: to one stop in 10⁹.
+//! Probability that a brake of many units is weak, by importance sampling: to one stop in 10⁹.
 //!
 //! A stop's deceleration over the nominal one is the mean over the units of (1 + friction)(1 + pressure)(1 +
 //! efficiency), 0 for a unit that failed, times (1 + common) / (1 + mass). For each level the draws are tilted
@@ -44,7 +44,7 @@ pub fn weakest(brake: &BrakeComponents, probability: f64, draws: usize, seed: u6
     sampled(brake, probability, Tilt::towards(brake, probability), (draws, seed))
 }
 
-/// The same without tilt.
+/// Returns the same without tilt.
 pub fn weakest_plain(
     brake: &BrakeComponents,
     probability: f64,
@@ -83,7 +83,7 @@ fn sampled(
 }
 
 impl Tilt {
-    /// The tilt under which stops as weak as the probability says are usual.
+    /// Returns the tilt under which stops as weak as the probability says are usual.
     fn towards(brake: &BrakeComponents, probability: f64) -> Self {
         let (mut low, mut high) = (-TILT_MAX * spread_inverse(brake), 0.0);
         for _ in 0..60 {
@@ -103,7 +103,7 @@ impl Tilt {
         }
     }
 
-    /// A stop's deceleration over the nominal one, and the weight of the draw.
+    /// Returns a stop's deceleration over the nominal one, and the weight of the draw.
     fn draw(&self, brake: &BrakeComponents, random: &mut ChaCha8Rng) -> (f64, f64) {
         let mut uniform = || (random.next_u64() >> 11) as f64 * 2f64.powi(-53) + 2f64.powi(-54);
         let mut log_weight = 0.0;
@@ -150,7 +150,7 @@ fn unit(brake: &BrakeComponents, tilt: f64) -> [f64; 3] {
     [log, (failed - log).exp(), (alive - log).exp() * (1.0 + each * variance)]
 }
 
-/// Logarithm of the moments of the sum, its mean under a tilt and its variance there.
+/// Returns the logarithm of the moments of the sum, its mean under a tilt and its variance there.
 fn cumulants(brake: &BrakeComponents, tilt: f64) -> [f64; 3] {
     let train = brake.common_std.powi(2) + brake.mass_std.powi(2);
     let [log, _, slope] = unit(brake, tilt);
@@ -161,7 +161,7 @@ fn cumulants(brake: &BrakeComponents, tilt: f64) -> [f64; 3] {
     [f64::from(brake.units) * log + 0.5 * tilt * tilt * train, slope + tilt * train, variance]
 }
 
-/// Probability of stops weaker than the mean under a tilt below 0 (saddle point).
+/// Returns the probability of stops weaker than the mean under a tilt below 0 (saddle point).
 fn tail(brake: &BrakeComponents, tilt: f64) -> f64 {
     let [log, mean, variance] = cumulants(brake, tilt);
     let width = (1.0 + std::f64::consts::TAU * tilt * tilt * variance).sqrt();

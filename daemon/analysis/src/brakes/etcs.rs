@@ -57,8 +57,8 @@ pub struct DeclaredBrakeFigures {
 }
 
 impl EtcsBrake {
-    /// The parameters, and what each rests on. The form asks for all of them, and for factors at the boundaries of the
-    /// emergency steps: what is not known is replaced, and marked as a guess.
+    /// Returns the parameters, and what each rests on. The form asks for all of them, and for factors at the boundaries
+    /// of the emergency steps: what is not known is replaced, and marked as a guess.
     pub fn of(found: &BrakeParameters, choice: &DeclaredBrakeFigures) -> (Self, Vec<Basis>) {
         let emergency = &found.emergency;
         let over = |value: f64| SpeedSteps::constant(value).between(&emergency.boundaries);
@@ -87,7 +87,7 @@ impl EtcsBrake {
     }
 }
 
-/// The level that is chosen.
+/// Returns the level that is chosen.
 fn reached<'f>(
     found: &'f BrakeParameters,
     choice: &DeclaredBrakeFigures,

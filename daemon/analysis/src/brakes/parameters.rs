@@ -31,7 +31,7 @@ pub struct Correction {
 }
 
 impl Correction {
-    /// The factor for the train: the smaller of both; `None` where neither data nor components reach.
+    /// Returns the factor for the train: the smaller of both; `None` where neither data nor components reach.
     pub fn k_dry(&self) -> Option<f64> {
         let given = [self.measured, self.modelled].into_iter().flatten();
         given.reduce(f64::min).map(|it| it.min(1.0))
@@ -67,7 +67,7 @@ pub struct BrakeParameters {
     pub k_wet: Option<SpeedSteps>,
 }
 
-/// The curve that the mean deceleration of a law lies above with a confidence.
+/// Returns the curve that the mean deceleration of a law lies above with a confidence.
 pub fn lower_bound(law: &DecelerationLaw, confidence: f64) -> Vec<[f64; 2]> {
     let quantile =
         StudentsT::new(0.0, 1.0, law.freedom).map_or(2.0, |it| it.inverse_cdf(confidence));
@@ -79,7 +79,7 @@ pub fn lower_bound(law: &DecelerationLaw, confidence: f64) -> Vec<[f64; 2]> {
     points.collect()
 }
 
-/// The decelerations that half of the stops by less than all of the brake exceed, and how many these are.
+/// Returns the decelerations that half of the stops by less than all of the brake exceed, and how many these are.
 pub fn usual(stops: &[RecordedStop]) -> (Option<SpeedSteps>, usize) {
     let is_usual = |it: &&RecordedStop| it.manner == Manner::Modulated && !it.has_slid;
     let usual: Vec<RecordedStop> = stops.iter().filter(is_usual).cloned().collect();
@@ -90,7 +90,7 @@ pub fn usual(stops: &[RecordedStop]) -> (Option<SpeedSteps>, usize) {
     (SpeedSteps::below(&curve), usual.len())
 }
 
-/// Deceleration on a wet rail over that on a dry one.
+/// Returns the deceleration on a wet rail over that on a dry one.
 pub fn wet_share(dry: &DecelerationLaw, wet: &DecelerationLaw) -> Option<SpeedSteps> {
     let pairs = dry.points.iter().zip(&wet.points);
     let curve: Vec<[f64; 2]> = pairs
@@ -99,7 +99,7 @@ pub fn wet_share(dry: &DecelerationLaw, wet: &DecelerationLaw) -> Option<SpeedSt
     SpeedSteps::below(&curve)
 }
 
-/// The corrections of all levels.
+/// Returns the corrections of all levels.
 pub fn corrections(law: &DecelerationLaw, declared: Option<&BrakeComponents>) -> Vec<Correction> {
     let brake = declared.map(|it| conditioned(it, law));
     let level = |ebcl: u32| {
@@ -112,8 +112,8 @@ pub fn corrections(law: &DecelerationLaw, declared: Option<&BrakeComponents>) ->
     (0..LEVELS).map(level).collect()
 }
 
-/// The components given the stops: what all units have in common is known as well as the stops show it, and what
-/// stops differ by beyond what the units explain is common to them.
+/// Returns the components given the stops: what all units have in common is known as well as the stops show it, and
+/// what stops differ by beyond what the units explain is common to them.
 fn conditioned(declared: &BrakeComponents, law: &DecelerationLaw) -> BrakeComponents {
     let units = f64::from(declared.units);
     let alive = 1.0 - declared.failure_probability;
@@ -130,8 +130,8 @@ fn conditioned(declared: &BrakeComponents, law: &DecelerationLaw) -> BrakeCompon
     BrakeComponents { common_std: (common + unexplained).sqrt(), ..*declared }
 }
 
-/// The value that all but a share of some values, from small to great, reach, with its 95 % interval; `None` for
-/// fewer values than show the share.
+/// Returns the value that all but a share of some values, from small to great, reach, with its 95 % interval; `None`
+/// for fewer values than show the share.
 fn by_order(values: &[f64], probability: f64) -> (Option<f64>, [Option<f64>; 2]) {
     let count = values.len();
     if (count as f64) * probability < 1.0 - 1e-9 {

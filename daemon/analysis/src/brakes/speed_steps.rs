@@ -20,12 +20,12 @@ impl SpeedSteps {
         SpeedSteps { boundaries: Vec::new(), values: vec![value] }
     }
 
-    /// The value at a speed in m/s.
+    /// Returns the value at a speed in m/s.
     pub fn at(&self, speed_mps: f64) -> f64 {
         self.values[self.boundaries.partition_point(|it| *it <= speed_mps)]
     }
 
-    /// The lowest values between other boundaries.
+    /// Returns the lowest values between other boundaries.
     pub fn between(&self, boundaries: &[f64]) -> Self {
         let starts = std::iter::once(0.0).chain(boundaries.iter().copied());
         let ends = boundaries.iter().copied().chain([f64::INFINITY]);
@@ -37,7 +37,7 @@ impl SpeedSteps {
         SpeedSteps { values: lowest.collect(), boundaries: boundaries.to_vec() }
     }
 
-    /// Distance in m to standstill from a speed in m/s by these decelerations.
+    /// Returns the distance in m to standstill from a speed in m/s by these decelerations.
     pub fn distance_m(&self, from_mps: f64) -> f64 {
         let mut low_mps = 0.0;
         let ends = self.boundaries.iter().copied().chain([f64::INFINITY]);

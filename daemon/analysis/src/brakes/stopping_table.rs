@@ -117,7 +117,7 @@ impl LeastSquares<FREE> for Fit<'_> {
 }
 
 impl TableLaw {
-    /// The brake behind some rows; `None` for rows that no brake gives.
+    /// Returns the brake behind some rows; `None` for rows that no brake gives.
     pub fn of(name: &str, rows: &[StoppingTableRow]) -> Option<Self> {
         let fastest_mps = rows.iter().map(|row| row.from_mps).fold(0.0, f64::max);
         let knots_mps = KNOTS.map(|share| share * fastest_mps);
@@ -168,7 +168,7 @@ impl TableLaw {
     }
 }
 
-/// The tables of a text with the head `brake_curve,speed_kph,grade_1_in_x,stopping_distance_m`, by their names;
+/// Returns the tables of a text with the head `brake_curve,speed_kph,grade_1_in_x,stopping_distance_m`, by their names;
 /// a gradient is `Level` or the x of 1 in x, negative falling.
 ///
 /// # Errors
@@ -224,8 +224,8 @@ const GRADIENTS: [f64; 14] = [
     -33.0,
 ];
 
-/// The distances that 95 % of stops of a law keep, as a table of the same form; what a law does not reach or does not
-/// stop on is left out.
+/// Returns the distances that 95 % of stops of a law keep, as a table of the same form; what a law does not reach or
+/// does not stop on is left out.
 pub fn write(name: &str, law: &DecelerationLaw, rotating_mass_factor: f64) -> String {
     let name: String = name.chars().filter(|it| !matches!(it, ',' | '\n' | '\r' | '"')).collect();
     let mut text = format!("{HEAD}\n");

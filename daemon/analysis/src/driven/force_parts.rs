@@ -62,12 +62,12 @@ impl AccelerationBalance {
         AccelerationBalance { forces, davis, speed_mps, is_held: false }
     }
 
-    /// The same at another speed in m/s nearby.
+    /// Returns the same at another speed in m/s nearby.
     pub(super) fn at(self, speed_mps: f64) -> Self {
         AccelerationBalance { speed_mps, ..self }
     }
 
-    /// The same while a brake that nobody reports holds the train.
+    /// Returns the same while a brake that nobody reports holds the train.
     pub(super) fn held(self) -> Self {
         AccelerationBalance { is_held: true, ..self }
     }
@@ -86,12 +86,12 @@ impl AccelerationBalance {
         if stays { 0.0 } else { free_mps2 }
     }
 
-    /// Gross mass in kg.
+    /// Returns the gross mass in kg.
     pub fn mass_kg(&self) -> f64 {
         self.forces.mass_kg
     }
 
-    /// A part in N. On a standing train it is what would act.
+    /// Returns a part in N. On a standing train it is what would act.
     pub fn force_n(&self, part: ForcePart) -> f64 {
         let SampleForces { resistance, .. } = &self.forces;
         let (davis, speed_mps) = (self.davis, self.speed_mps);
@@ -111,7 +111,7 @@ impl AccelerationBalance {
         self.weight_kn() * n_per_kn
     }
 
-    /// All that resists in N but brake and gradient.
+    /// Returns all that resists in N but brake and gradient.
     pub fn resistance_n(&self) -> f64 {
         let (davis, speed_mps) = (self.davis, self.speed_mps);
         let extra_n_per_kn = self.forces.resistance.extra_n_per_kn(davis, speed_mps);

@@ -72,7 +72,7 @@ impl LateSensor {
 }
 
 impl DrivenTrain {
-    /// A train at its beginning; without a line the gradient comes with what acts.
+    /// Returns a train at its beginning; without a line the gradient comes with what acts.
     pub fn new(train: Arc<TrainModel>, track: Option<Arc<Track>>, beginning: Beginning) -> Self {
         let Beginning { position_m, speed_mps, is_held_at_rest } = beginning;
         let sensor = LateSensor::of(&train, speed_mps);
@@ -83,7 +83,7 @@ impl DrivenTrain {
         DrivenTrain { train, forces, is_held_at_rest, position_m, speed_mps, sensor, balance: None }
     }
 
-    /// Chainage of the train's centre in m, by its own motion.
+    /// Returns the chainage of the train's centre in m, by its own motion.
     pub fn position_m(&self) -> f64 {
         self.position_m
     }
@@ -93,7 +93,7 @@ impl DrivenTrain {
         self.speed_mps
     }
 
-    /// Speed in m/s as the train's own sensor shows it.
+    /// Returns the speed in m/s as the train's own sensor shows it.
     pub fn measured_speed_mps(&self) -> f64 {
         let shown_mps = self.sensor.as_ref().map_or(self.speed_mps, |sensor| sensor.shown_mps);
         shown_mps * self.train.corrections.speed_scale
@@ -166,7 +166,7 @@ impl DrivenTrain {
         self.balance = self.balance.map(|balance| balance.at(after.speed_mps));
     }
 
-    /// The forces at a motion within a step, and whether the train is pulled.
+    /// Returns the forces at a motion within a step, and whether the train is pulled.
     fn balanced(
         &mut self,
         acting: &TrainSample,

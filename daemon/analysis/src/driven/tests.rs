@@ -9,7 +9,7 @@ use dynocar_shared::TrainId;
 
 const DAVIS: Davis = Davis { a: 1.5, b: 0.02, c: 0.004 };
 
-/// A train with a bit of every term that does not ask for its speed.
+/// Returns a train with a bit of every term that does not ask for its speed.
 fn updated_train() -> TrainModel {
     let mut train = TrainModel::bare("grown", 100e3, DAVIS);
     train.rotating_mass_factor = 0.06;

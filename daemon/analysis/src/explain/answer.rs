@@ -39,7 +39,7 @@ impl ExplainAnswer {
         self.caveats.push(sentence.trim().to_owned());
     }
 
-    /// The diagnostics by which the data cannot be true.
+    /// Returns the diagnostics by which the data cannot be true.
     pub fn impossibilities(&self) -> impl Iterator<Item = &DatasetDiagnostic> {
         self.diagnostics.iter().filter(|diagnostic| diagnostic.severity == Severity::Fundamental)
     }

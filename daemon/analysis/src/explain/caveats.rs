@@ -26,7 +26,7 @@ pub struct FinishedFit<'a> {
 }
 
 impl FinishedFit<'_> {
-    /// The courses of an effect.
+    /// Returns the courses of an effect.
     pub fn courses(&self, kind: EffectKind) -> Vec<Course> {
         let own = self.courses.iter().filter(|it| it.0 == kind);
         own.flat_map(|it| it.1.clone()).collect()
@@ -105,7 +105,7 @@ const ESTIMATED_MIN: f64 = 0.5;
 /// Speeds that spread over less than this share of the greatest are one speed.
 const VARIED_MIN: f64 = 0.5;
 
-/// Share of the variance of a, b and c before the data that the data take away: 1 where they say
+/// Returns the share of the variance of a, b and c before the data that the data take away: 1 where they say
 /// all, 0 where they say nothing.
 pub fn told_by_data(problem: &FitProblem, deviation: &[f64]) -> DavisDeviations {
     let share = |i: usize| {

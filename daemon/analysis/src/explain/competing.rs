@@ -55,7 +55,7 @@ pub fn competing_hypotheses(outcome: &SearchOutcome) -> Vec<CompetingHypotheses>
     each.filter(|competing| !competing.kinds.is_empty()).collect()
 }
 
-/// Whether a trial could stand in the place of the accepted one.
+/// Returns whether a trial could stand in the place of the accepted one.
 fn comes_close(trial: &EffectTrial, accepted: &EffectTrial, outcome: &SearchOutcome) -> bool {
     let last = outcome.rounds.last().into_iter().flat_map(|round| round.iter());
     let left = last.clone().find(|left| left.kind == trial.kind).map_or(0.0, |left| left.evidence);
@@ -77,7 +77,7 @@ fn comes_close(trial: &EffectTrial, accepted: &EffectTrial, outcome: &SearchOutc
         && left < 0.5 * trial.evidence
 }
 
-/// The kinds that could stand in the place of some effect, each once.
+/// Returns the kinds that could stand in the place of some effect, each once.
 pub fn kinds_of(competing: &[CompetingHypotheses]) -> Vec<&'static str> {
     let mut kinds: Vec<&'static str> = Vec::new();
     for kind in competing.iter().flat_map(|it| &it.kinds) {
@@ -97,7 +97,7 @@ pub fn separating_run(kind: EffectKind, competing: &[EffectKind]) -> &'static st
 /// Runners-up at most.
 const SHOWN: usize = 3;
 
-/// A formula without its numbers.
+/// Returns a formula without its numbers.
 fn form(formula: String) -> String {
     formula
         .chars()
@@ -105,7 +105,7 @@ fn form(formula: String) -> String {
         .collect()
 }
 
-/// The forms next best to the one that was found, each fitted with everything else; empty where
+/// Returns the forms next best to the one that was found, each fitted with everything else; empty where
 /// nothing outside the library was found.
 pub fn runners_up(search: &Search, outcome: &SearchOutcome) -> Vec<RunnerUp> {
     let fit = &outcome.fit;

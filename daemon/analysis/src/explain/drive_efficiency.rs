@@ -43,7 +43,7 @@ struct Auxiliaries {
 }
 
 impl Auxiliaries {
-    /// The power at rest of some runs and its scatter; the declared one with a wide one where they
+    /// Returns the power at rest of some runs and its scatter; the declared one with a wide one where they
     /// never rest.
     fn of(powered: &[&RunData], declared: PowerTrain) -> Self {
         let rows = powered.iter().filter_map(|run| Some((run, run.power.as_ref()?)));
@@ -67,7 +67,7 @@ impl Auxiliaries {
 /// load by some hundredths: standard deviation as a share of the drive's root mean square power.
 const AUXILIARIES_FORM_SHARE: f64 = 0.02;
 
-/// Root mean square of the power in kW of moving samples.
+/// Returns the root mean square of the power in kW of moving samples.
 fn moving_power_kw(problem: &FitProblem) -> f64 {
     let rows = problem.runs.iter().filter_map(|run| Some((run, run.power.as_ref()?)));
     let moving = rows

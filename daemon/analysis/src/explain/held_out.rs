@@ -116,7 +116,7 @@ fn without(information: &DMatrix<f64>, start: usize, size: usize) -> Option<DMat
     Some(rest)
 }
 
-/// Probability that numbers of such a covariance are as far from zero.
+/// Returns the probability that numbers of such a covariance are as far from zero.
 fn chance(numbers: &DVector<f64>, covariance: &DMatrix<f64>) -> Option<f64> {
     let square = numbers.dot(&Cholesky::new(covariance.clone())?.solve(numbers));
     Some(ChiSquared::new(numbers.len() as f64).ok()?.sf(square))

@@ -63,12 +63,12 @@ pub struct ReportContext<'a> {
 }
 
 impl ReportContext<'_> {
-    /// Covariance of c with the effect's first parameter.
+    /// Returns the covariance of c with the effect's first parameter.
     pub fn c_covariance(&self) -> f64 {
         self.covariance[(2, self.first)]
     }
 
-    /// Each of the effect's parameters.
+    /// Returns each of the effect's parameters.
     pub fn each_of(&self, parameters: &[Parameter]) -> ReportedValues {
         let mut reported = ReportedValues::default();
         for (i, parameter) in parameters.iter().enumerate() {
@@ -77,7 +77,7 @@ impl ReportContext<'_> {
         reported
     }
 
-    /// Standard deviation of the sum of the effect's parameters, which may be far less than that of each.
+    /// Returns the standard deviation of the sum of the effect's parameters, which may be far less than that of each.
     pub fn deviation_of_sum(&self) -> f64 {
         let count = self.deviations.len();
         let own = self.covariance.view((self.first, self.first), (count, count));
@@ -230,22 +230,22 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
     /// Returns the properties of the structure, whatever the values of its parameters.
     fn nature(&self) -> Nature<'_>;
 
-    /// The kind it belongs to.
+    /// Returns the kind it belongs to.
     fn kind(&self) -> EffectKind {
         self.nature().kind
     }
 
-    /// Its parameters, in order.
+    /// Returns its parameters, in order.
     fn parameters(&self) -> &[Parameter] {
         self.nature().parameters
     }
 
-    /// The value of each parameter at which there is no effect.
+    /// Returns the value of each parameter at which there is no effect.
     fn none(&self) -> f64 {
         self.nature().none
     }
 
-    /// True when each parameter adds a gradient in proportion to it, and nothing else.
+    /// Returns whether each parameter adds a gradient in proportion to it, and nothing else.
     fn is_gradient(&self) -> bool {
         self.nature().handling == Handling::Gradient
     }
@@ -265,7 +265,7 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         permille.resize(run.samples().len(), 0.0);
     }
 
-    /// The factor on what they do, where it [scales](OnOthers::Scales) them.
+    /// Returns the factor on what they do, where it [scales](OnOthers::Scales) them.
     fn scale_of_others(&self, _parameters: &[f64]) -> f64 {
         1.0
     }
@@ -290,7 +290,7 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         }
     }
 
-    /// Measured over true speed.
+    /// Returns the measured over true speed.
     fn speed_scale(&self, _parameters: &[f64]) -> f64 {
         1.0
     }
@@ -300,37 +300,37 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         None
     }
 
-    /// The site at which it was found; `None` for what has none.
+    /// Returns the site at which it was found; `None` for what has none.
     fn site(&self) -> Option<&Site> {
         None
     }
 
-    /// The same structure at another site.
+    /// Returns the same structure at another site.
     fn at_site(&self, _site: Site) -> Option<SharedHypothesis> {
         None
     }
 
-    /// Where it acts.
+    /// Returns where it acts.
     fn place(&self) -> Location {
         self.site().map_or_else(Location::default, Site::place)
     }
 
-    /// The ends of its places that were estimated from the speeds.
+    /// Returns the ends of its places that were estimated from the speeds.
     fn ends(&self) -> Vec<IntervalEnd> {
         self.site().map_or_else(Vec::new, Site::ends)
     }
 
-    /// The same structure with one of its ends elsewhere; `None` where that makes no place.
+    /// Returns the same structure with one of its ends elsewhere; `None` where that makes no place.
     fn with_end(&self, end: &IntervalEnd, at: f64) -> Option<SharedHypothesis> {
         self.at_site(self.site()?.moved(end, at)?)
     }
 
-    /// Kinds that none of the runs at hand could distinguish from it.
+    /// Returns the kinds that none of the runs at hand could distinguish from it.
     fn twins(&self, _parameters: &[f64]) -> &'static [EffectKind] {
         &[]
     }
 
-    /// True when it acts in certain runs only: an event, and no property of train or line.
+    /// Returns whether it acts in certain runs only: an event, and no property of train or line.
     fn is_event(&self) -> bool {
         let place = self.place();
         place.windows.is_some() || place.runs.is_some()
@@ -342,17 +342,17 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         0.0
     }
 
-    /// Whether the effect is larger than what declared figures are usually good for.
+    /// Returns whether the effect is larger than what declared figures are usually good for.
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
         self.nature().least.is_none_or(|least| self.size(parameters).abs() > least)
     }
 
-    /// Why parameters like these are not what the kind says, whatever speaks for them.
+    /// Returns why parameters like these are not what the kind says, whatever speaks for them.
     fn contradiction(&self, _parameters: &[f64]) -> Option<&'static str> {
         None
     }
 
-    /// The first parameter that lies at a bound of what is looked for, other than at no effect: the
+    /// Returns the first parameter that lies at a bound of what is looked for, other than at no effect: the
     /// data ask for something else, or hold it not at all.
     fn at_bound(&self, parameters: &[f64]) -> Option<AtBound> {
         let mut specs = self.parameters().iter().zip(parameters);
@@ -363,7 +363,7 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         })
     }
 
-    /// How far it is from no effect, in the unit of its first parameter.
+    /// Returns how far it is from no effect, in the unit of its first parameter.
     fn size(&self, parameters: &[f64]) -> f64 {
         parameters[0] - self.none()
     }
@@ -376,7 +376,7 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         (!numbers.is_empty()).then_some(numbers)
     }
 
-    /// The law in a formula, for what has no name.
+    /// Returns the law in a formula, for what has no name.
     fn formula(&self, _parameters: &[f64]) -> Option<String> {
         None
     }

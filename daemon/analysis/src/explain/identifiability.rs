@@ -1,4 +1,4 @@
-//! Which numbers of train and line the data hold at all, beside those that were looked at as effects.
+//! Numbers of train and line that the data determine or leave open, apart from the effects found.
 //!
 //! Every kind of the library that is one number of the whole train or line is added to the finished model, at no
 //! effect, and the information matrix shows how surely it is zero, and whether it is distinguishable from each of
@@ -14,7 +14,7 @@ use super::competing::separating_run;
 use super::effects::{Candidate, LIBRARY};
 use super::selection::{Search, SearchOutcome};
 
-/// The kinds that are one number of the whole train or line, and not found.
+/// Returns the kinds that are one number of the whole train or line, and not found.
 fn whole_kinds(search: &Search, outcome: &SearchOutcome) -> Vec<Candidate> {
     let Some(scan) = search.scan(&outcome.fit) else { return Vec::new() };
     let others = LIBRARY.iter().filter(|effect| !outcome.fit.model.has(effect.kind));

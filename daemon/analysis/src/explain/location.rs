@@ -85,7 +85,7 @@ impl Location {
         }
     }
 
-    /// Whether the place may be in a run, by its file.
+    /// Returns whether the place may be in a run, by its file.
     pub fn may_be_in(&self, file: &str) -> bool {
         self.runs.as_ref().is_none_or(|runs| runs.iter().any(|run| run == file))
             && self.windows.as_ref().is_none_or(|all| all.iter().any(|own| own.run == file))

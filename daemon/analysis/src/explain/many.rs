@@ -1,5 +1,5 @@
-//! Many runs: the search looks at some of them, evenly chosen and thinned to a second; then all of them say how large
-//! it is what was found, and how well it predicts.
+//! Many runs: the search uses some of them, evenly chosen and thinned to a second; then all of them determine the sizes
+//! of the effects found, and score the prediction.
 //!
 //! Whatever the number of runs, a fixed number is held in memory. Then all are read one after the other, as recorded, and
 //! reduced to their normal equations at the finished model, which add up, or to their errors. What acts in some runs only
@@ -79,12 +79,12 @@ impl Held {
         Some(Held { groups: groups.collect() })
     }
 
-    /// Whether a run is held, by its place from 0.
+    /// Returns whether a run is held, by its place from 0.
     pub fn holds(&self, index: usize) -> bool {
         self.groups[index].is_held
     }
 
-    /// First and last file of each group of fit runs.
+    /// Returns the first and last file of each group of fit runs.
     fn spans(&self, runs: &[Run]) -> Vec<Span> {
         let mut spans: Vec<Span> = Vec::new();
         let fit = self.groups.iter().zip(runs).filter(|(group, _)| group.role == Role::Fit);
@@ -97,7 +97,7 @@ impl Held {
         spans
     }
 
-    /// The places of the runs of a role, by group.
+    /// Returns the places of the runs of a role, by group.
     fn members(&self, role: Role) -> Vec<Vec<usize>> {
         let own = || self.groups.iter().enumerate().filter(|(_, group)| group.role == role);
         let count = own().map(|(_, group)| group.number + 1).max().unwrap_or(0);
@@ -127,17 +127,17 @@ impl Preparation {
         Preparation { declared, drive, late_s, train }
     }
 
-    /// The train, with the drive that was found.
+    /// Returns the train, with the drive that was found.
     pub fn train(&self) -> &TrainModel {
         &self.train
     }
 
-    /// The line.
+    /// Returns the line.
     pub fn track(&self) -> Option<&Arc<Track>> {
         self.declared.track.as_ref()
     }
 
-    /// A run made ready.
+    /// Returns a run made ready.
     ///
     /// # Errors
     ///
@@ -164,7 +164,7 @@ pub struct Many<'a, E> {
     pub read: &'a (dyn Fn(usize) -> Result<Run, E> + Sync),
 }
 
-/// Whether a model's effects act in each run alike.
+/// Returns whether a model's effects act in each run alike.
 fn is_common(fit: &Fit) -> bool {
     fit.model.effects.iter().all(|effect| {
         let place = effect.place();
@@ -273,12 +273,12 @@ impl<E: From<RunDataError> + Send> Many<'_, E> {
         preparation.run(run, Density::Recorded).map(Some)
     }
 
-    /// First and last file of the runs in each row of normal equations.
+    /// Returns the first and last file of the runs in each row of normal equations.
     pub(super) fn spans(&self) -> Vec<Span> {
         self.held.spans(&self.dataset.runs)
     }
 
-    /// How many runs say what, as a sentence to follow another.
+    /// Returns how many runs say what, as a sentence to follow another.
     pub(super) fn sentence(&self, outcome: &SearchOutcome) -> String {
         let fit = self.dataset.with_role(Role::Fit).count();
         let sizes = match is_common(&outcome.fit) {

@@ -9,7 +9,7 @@ use super::score::predicted;
 use crate::statistics::rms;
 
 impl EffectMeaning {
-    /// That of one effect of a fitted model; `rest` is the model refitted without it.
+    /// Returns that of one effect of a fitted model; `rest` is the model refitted without it.
     pub fn of(problem: &FitProblem, fit: &Fit, index: usize, rest: &Fit) -> Self {
         let (mut effect_j, mut traction_j, mut distance_m) = (0.0, 0.0, 0.0);
         for run in &problem.runs {
@@ -61,7 +61,7 @@ impl Work {
     }
 }
 
-/// Root mean square in m, over all whole minutes of motion, of the predicted less the measured distance;
+/// Returns the root mean square in m, over all whole minutes of motion, of the predicted less the measured distance;
 /// each minute starts at the measured speed.
 fn distance_error_m(problem: &FitProblem, fit: &Fit) -> Option<f64> {
     let mut errors_m = Vec::new();
@@ -72,7 +72,7 @@ fn distance_error_m(problem: &FitProblem, fit: &Fit) -> Option<f64> {
     (!errors_m.is_empty()).then(|| rms(&errors_m))
 }
 
-/// Predicted less measured distance in m of each minute of a run that is driven without a gap.
+/// Returns the predicted less measured distance in m of each minute of a run that is driven without a gap.
 fn minutes(run: &RunData, prediction: &Prediction) -> Vec<f64> {
     let (recording, time_s) = (&run.recording, run.recording.time_s());
     let minute_of = |i: usize| (time_s[i] / Restart::WINDOW_S) as usize;

@@ -1,22 +1,22 @@
-//! Explaining a residual: what the declared model leaves, which undeclared effect explains it,
-//! how sure that is, and what the model with the effect predicts.
+//! Explaining a residual: the part of the motion that the declared model does not predict, the undeclared effect that
+//! explains it, its significance, and the prediction of the model with the effect.
 //!
 //! # Layout, in the order of the work
 //!
 //! - [`evidence`]: observations, noise, the joint fit of a, b, c and effects
 //! - [`drive_efficiency`]: the efficiency of a drive of which only the power is recorded
 //! - [`force_time`]: forces that act before their stamps
-//! - [`hypothesis`], [`effects`]: what an effect is to the others; the library, one file for each kind
+//! - [`hypothesis`], [`effects`]: the interface of an effect; the library, one file for each kind
 //! - [`scan`], [`places`], [`residual_pressure`]: what a force of some shape, at some place or
 //!   time, would explain
 //! - [`selection`]: the search for effects, its significance, evidence by run, the finished model beside what is
 //!   usually wrong
 //! - [`score`], [`stop_to_stop`], `bootstrap`: open-loop prediction of fit and holdout runs
-//! - [`many`]: some of many runs, and what all of them say
+//! - [`many`]: some of many runs for the search, all of them for sizes and scores
 //! - [`over_time`], [`held_out`]: numbers that differ between runs, and confirmation by the runs held out
 //! - [`unexplained`], [`identifiability`], [`competing`], [`meaning`], `caveats`, [`verdict`],
 //!   [`answer`]: the statement
-//! - [`report`]: what a report shows beyond it
+//! - [`report`]: further contents of a report
 //!
 //! [`explain`] runs it all.
 

@@ -1,4 +1,5 @@
-//! Course of an effect over the runs: what grows, fades or changes at once is shown over time, and not averaged.
+//! Course of an effect over the runs: an effect that grows, fades or changes at once is shown over time, and not
+//! averaged.
 //!
 //! Each run has its own normal equations at the finished model. A number that differs from run to run by a given
 //! course (a line, or a step between two runs) is one parameter more, and follows from them by linear algebra: the runs
@@ -31,7 +32,7 @@ const NUMBERS_MAX: usize = 2;
 /// First and last file of the runs that make a row of normal equations.
 pub type Span = [String; 2];
 
-/// The courses of the numbers of a fitted model that change over the runs, by effect.
+/// Returns the courses of the numbers of a fitted model that change over the runs, by effect.
 ///
 /// `spans` names the runs of the fit's normal equations, `stds` are the stated deviations of the parameters of the
 /// first effects, which are looked at.
@@ -70,14 +71,14 @@ pub fn courses(
     all
 }
 
-/// Whether an effect has the same one or two numbers in each run.
+/// Returns whether an effect has the same one or two numbers in each run.
 pub fn is_one_in_all_runs(effect: &dyn Hypothesis) -> bool {
     let place = effect.place();
     let is_common = place.runs.is_none() && place.windows.is_none();
     is_common && effect.parameters().len() <= NUMBERS_MAX && !effect.nature().is_one_number_a_run
 }
 
-/// The course of the scale of the speeds by positions alone, where no effect of the model is about it.
+/// Returns the course of the scale of the speeds by positions alone, where no effect of the model is about it.
 fn by_positions(problem: &FitProblem, fit: &Fit, spans: &[Span]) -> Option<Course> {
     let (ratio, std) = problem.positions.distance_ratio?;
     let mut runs = vec![RunNormal::none(1); fit.runs.len()];
@@ -108,7 +109,7 @@ struct Runs<'a> {
 }
 
 impl Runs<'_> {
-    /// The course where one shows that is larger than the 95 % interval of what is stated for all runs.
+    /// Returns the course where one shows that is larger than the 95 % interval of what is stated for all runs.
     fn course(&self, parameter: &'static str, std: f64, spans: &[Span]) -> Option<Course> {
         if self.runs.len() < RUNS_MIN {
             return None;
@@ -118,7 +119,7 @@ impl Runs<'_> {
         is_stated.then(|| Course { parameter, parts: self.parts(spans), p_value })
     }
 
-    /// The likeliest change from the first run to the last, and the probability of as much by chance.
+    /// Returns the likeliest change from the first run to the last, and the probability of as much by chance.
     fn change(&self) -> Option<(f64, f64)> {
         let count = self.runs.len();
         let line = (0..count).map(|k| k as f64 / (count - 1) as f64).collect();
@@ -134,7 +135,7 @@ impl Runs<'_> {
         shapes.iter().filter_map(chance).min_by(|one, other| one.1.total_cmp(&other.1))
     }
 
-    /// The size of a course of a given shape, with its standard deviation, all parameters estimated with it.
+    /// Returns the size of a course of a given shape, with its standard deviation, all parameters estimated with it.
     fn along(&self, shape: &[f64]) -> Option<(f64, f64)> {
         let i = self.number;
         let total = self.runs.iter().fold(self.prior.0.clone(), |sum, run| sum + &run.information);
@@ -178,7 +179,7 @@ impl Runs<'_> {
         self.runs.iter().fold(self.prior.1.clone(), |sum, run| sum + &run.score)
     }
 
-    /// The number by itself in each of some parts of the runs, all others common to all.
+    /// Returns the number by itself in each of some parts of the runs, all others common to all.
     fn parts(&self, spans: &[Span]) -> Vec<CoursePart> {
         let (i, count) = (self.number, self.runs.len());
         let parts = (count / PART_RUNS_MIN).clamp(1, PARTS_MAX);
@@ -274,7 +275,7 @@ mod tests {
 
     use super::*;
 
-    /// A number from 0 to 1.
+    /// Returns a number from 0 to 1.
     fn share(random: &mut ChaCha8Rng) -> f64 {
         f64::from(random.next_u32()) / f64::from(u32::MAX)
     }

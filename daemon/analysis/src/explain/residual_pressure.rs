@@ -31,7 +31,7 @@ fn released(run: &RunData) -> Vec<(f64, f64)> {
     points
 }
 
-/// The instant from which the pressure of one run is higher for good.
+/// Returns the instant from which the pressure of one run is higher for good.
 fn onset_s(points: &[(f64, f64)], baseline_pa: f64) -> Option<f64> {
     if points.len() < 2 * SAMPLES_MIN {
         return None;
@@ -70,7 +70,7 @@ fn onset_s(points: &[(f64, f64)], baseline_pa: f64) -> Option<f64> {
     is_high.then_some(0.0)
 }
 
-/// Windows, in the recordings' own time, in which the cylinders of some runs keep a pressure;
+/// Returns the windows, in the recordings' own time, in which the cylinders of some runs keep a pressure;
 /// `None` when no pressure says anything.
 pub fn windows<'r>(runs: impl Iterator<Item = &'r RunData> + Clone) -> Option<Vec<RunWindow>> {
     let points: Vec<(&RunData, Vec<(f64, f64)>)> = runs.map(|run| (run, released(run))).collect();

@@ -30,7 +30,7 @@ pub struct Tuple {
 }
 
 impl Tuple {
-    /// Nothing.
+    /// Returns nothing.
     pub fn zero(count: usize) -> Self {
         Tuple { score: 0.0, square: 0.0, cross: DVector::zeros(count) }
     }
@@ -68,7 +68,7 @@ pub struct Scan<'a> {
 }
 
 impl<'a> Scan<'a> {
-    /// A scan around a fit; `None` when the fit's information is singular.
+    /// Returns a scan around a fit; `None` when the fit's information is singular.
     pub fn new(
         problem: &'a FitProblem,
         holdout: &'a [RunData],
@@ -81,13 +81,13 @@ impl<'a> Scan<'a> {
         Some(Scan { problem, holdout, train, track, fit, covariance, adjoints })
     }
 
-    /// Acceleration in m/s² that 1 N/kN of force gives.
+    /// Returns the acceleration in m/s² that 1 N/kN of force gives.
     #[inline]
     pub fn per_unit_resistance_mps2(&self, sample: &ResolvedSample) -> f64 {
         sample.weight_kn / sample.inertial_mass_kg
     }
 
-    /// Time in s of used motion where a condition on the sample holds.
+    /// Returns the time in s of used motion where a condition on the sample holds.
     pub fn seconds_where(&self, condition: impl Fn(&RunData, &ResolvedSample) -> bool) -> f64 {
         let mut total_s = 0.0;
         for run in &self.problem.runs {
@@ -101,17 +101,17 @@ impl<'a> Scan<'a> {
         total_s
     }
 
-    /// The tuple of a force shape over all runs: `acceleration(run, sample)` in m/s² per unit.
+    /// Returns the tuple of a force shape over all runs: `acceleration(run, sample)` in m/s² per unit.
     pub fn tuple(&self, acceleration: impl Fn(&RunData, usize) -> f64 + Sync) -> Tuple {
         self.over_each_run(1, |index, _| self.run_tuple(index, &acceleration))
     }
 
-    /// Where a fit may start from: the tuple of a force shape over some of many runs, as if over all.
+    /// Returns where a fit may start from: the tuple of a force shape over some of many runs, as if over all.
     pub fn coarse_tuple(&self, acceleration: impl Fn(&RunData, usize) -> f64 + Sync) -> Tuple {
         self.over_some_runs(|index, _| self.run_tuple(index, &acceleration))
     }
 
-    /// The sum of a tuple of each of some of many runs, evenly chosen, as if over all.
+    /// Returns the sum of a tuple of each of some of many runs, evenly chosen, as if over all.
     fn over_some_runs(&self, of_run: impl Fn(usize, &RunData) -> Tuple + Sync) -> Tuple {
         let runs = self.problem.runs.len();
         let step = coarse_step(runs);
@@ -137,19 +137,19 @@ impl<'a> Scan<'a> {
         sum
     }
 
-    /// The tuple of a force shape over one run.
+    /// Returns the tuple of a force shape over one run.
     pub fn run_tuple(&self, index: usize, acceleration: impl Fn(&RunData, usize) -> f64) -> Tuple {
         let run = &self.problem.runs[index];
         let shape: Vec<f64> = run.bins.iter().map(|bin| acceleration(run, bin.middle())).collect();
         self.shape_tuple(index, &shape)
     }
 
-    /// The tuple of accelerations in m/s² at the bins of one run.
+    /// Returns the tuple of accelerations in m/s² at the bins of one run.
     pub fn shape_tuple(&self, index: usize, shape: &[f64]) -> Tuple {
         self.local_tuple(index, 0, shape)
     }
 
-    /// The same of accelerations at the bins from one on; none act at the others.
+    /// Returns the same of accelerations at the bins from one on; none act at the others.
     pub fn local_tuple(&self, index: usize, from: usize, shape: &[f64]) -> Tuple {
         let mut tuple = Tuple::zero(self.fit.theta.len());
         let acts = |mps2: &f64| *mps2 != 0.0;
@@ -193,7 +193,7 @@ impl<'a> Scan<'a> {
         tuple.square - tuple.cross.dot(&(&self.covariance * &tuple.cross))
     }
 
-    /// Decrease of the cost by a free factor on the shape, and that factor.
+    /// Returns the decrease of the cost by a free factor on the shape, and that factor.
     pub fn gain(&self, tuple: &Tuple) -> (f64, f64) {
         let free = self.free_square(tuple);
         if free <= 1e-6 * tuple.square || free <= 1e-9 {
@@ -202,7 +202,7 @@ impl<'a> Scan<'a> {
         (tuple.score * tuple.score / free, tuple.score / free)
     }
 
-    /// Decrease of the cost when the shape acts with the factor 1.
+    /// Returns the decrease of the cost when the shape acts with the factor 1.
     pub fn decrease_at_one(&self, tuple: &Tuple) -> f64 {
         2.0 * tuple.score - self.free_square(tuple)
     }

@@ -46,7 +46,7 @@ impl RunScore {
     }
 }
 
-/// Speeds of a run predicted open loop.
+/// Returns the speeds of a run predicted open loop.
 pub fn predicted(fit: &Fit, run: &RunData, restart: Restart) -> Prediction {
     let (mut forces, mut prediction) = (UpdatedForces::default(), Prediction::new());
     fit.model.forces(run, &fit.theta, &mut forces);
@@ -54,7 +54,7 @@ pub fn predicted(fit: &Fit, run: &RunData, restart: Restart) -> Prediction {
     prediction
 }
 
-/// Error of a model over one run.
+/// Returns the error of a model over one run.
 pub fn run_error(fit: &Fit, run: &RunData, restart: Restart) -> SpeedError {
     let [error] = errors_at(fit, &fit.theta, (run, &RunFactors::zeros()), [restart]);
     error
@@ -75,14 +75,14 @@ fn errors_at<const N: usize>(
     ways.map(|(prediction, _)| SpeedError::of(&run.recording, &prediction))
 }
 
-/// Errors of recorded runs from stop to stop, by the models without and with the effects; `None`
+/// Returns the errors of recorded runs from stop to stop, by the models without and with the effects; `None`
 /// where none of them goes from stop to stop.
 pub fn stop_to_stop(runs: &[RunData], before: &Fit, after: &Fit) -> Option<StopToStop> {
     let of_run = |run: &RunData| stop_errors_mps(run, before, after);
     StopToStop::from_errors(runs.iter().map(of_run).collect())
 }
 
-/// The same of one run, in m/s.
+/// Returns the same of one run, in m/s.
 fn stop_errors_mps(run: &RunData, before: &Fit, after: &Fit) -> Vec<[f64; 2]> {
     let errors_mps = |fit: &Fit| {
         let prediction = predicted(fit, run, Restart::AtDepartures);
@@ -106,7 +106,7 @@ pub struct FitErrors {
 }
 
 impl FitErrors {
-    /// Those of a fitted model.
+    /// Returns those of a fitted model.
     pub fn of(problem: &FitProblem, fit: &Fit) -> Self {
         let speed_mps = fit.open_loop_mps(|| open_loop_mps(problem, fit));
         let missed =
@@ -119,9 +119,9 @@ impl FitErrors {
         }
     }
 
-    /// Share of the error that a model with these errors takes away from another: over whole runs, with restarts,
-    /// with each run's own load and wind or, for the scale of the speeds, of the distance, whichever is most; of runs
-    /// that were fitted or of runs left out, whichever is less.
+    /// Returns the share of the error that a model with these errors takes away from another: over whole runs, with
+    /// restarts, with each run's own load and wind or, for the scale of the speeds, of the distance, whichever is most;
+    /// of runs that were fitted or of runs left out, whichever is less.
     pub fn reduction_from(&self, before: &Self) -> f64 {
         let share = |before: f64, after: f64| if before > 0.0 { 1.0 - after / before } else { 0.0 };
         let of_distance = if self.has_speed_scale == before.has_speed_scale {
@@ -138,7 +138,7 @@ impl FitErrors {
     }
 }
 
-/// Root mean squares in m/s of the open-loop errors as fitted and left out, in the three ways.
+/// Returns the root mean squares in m/s of the open-loop errors as fitted and left out, in the three ways.
 fn open_loop_mps(problem: &FitProblem, fit: &Fit) -> [[f64; 3]; 2] {
     let fitted = vec![fit.theta.clone(); problem.runs.len()];
     [fitted, without_each_run(problem, fit)].map(|theta| {
@@ -162,7 +162,7 @@ fn open_loop_mps(problem: &FitProblem, fit: &Fit) -> [[f64; 3]; 2] {
     })
 }
 
-/// Share of the open-loop error of the fit runs that the larger model takes away.
+/// Returns the share of the open-loop error of the fit runs that the larger model takes away.
 pub fn reduction(problem: &FitProblem, smaller: &Fit, larger: &Fit) -> f64 {
     FitErrors::of(problem, larger).reduction_from(&FitErrors::of(problem, smaller))
 }
@@ -176,7 +176,8 @@ pub fn pooled(parts: impl Iterator<Item = [SpeedError; 2]>) -> Option<[f64; 3]> 
 }
 
 impl PredictionScore {
-    /// The scores of the holdout runs with the errors of the models without and with the effects on the fit runs.
+    /// Returns the scores of the holdout runs with the errors of the models without and with the effects on the fit
+    /// runs.
     pub fn of(problem: &FitProblem, holdout: Vec<RunScore>, before: &Fit, after: &Fit) -> Self {
         let summed = |parts: &mut dyn Iterator<Item = [SpeedError; 2]>| {
             let add =
@@ -203,7 +204,7 @@ impl PredictionScore {
         })
     }
 
-    /// The error of the holdout runs by which the model is judged; `None` without motion in them.
+    /// Returns the error of the holdout runs by which the model is judged; `None` without motion in them.
     pub fn judged(&self) -> Option<Judged> {
         let [before, after] = self.holdout_rmse_mps();
         let by_full_runs = || {

@@ -17,7 +17,7 @@ use crate::statistics::{median, rms};
 /// A run that moves for less time in s is a shunt in a queue, and says little.
 const STOP_RUN_MOVING_MIN_S: f64 = 10.0;
 
-/// The runs from stop to stop that can be simulated from departure to standstill: first sample,
+/// Returns the runs from stop to stop that can be simulated from departure to standstill: first sample,
 /// at rest, and one past the last, at rest again.
 pub fn stop_runs(recording: &OpenLoopRecording) -> Vec<Range<usize>> {
     let (samples, time_s) = (recording.samples(), recording.time_s());

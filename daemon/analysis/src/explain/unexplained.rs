@@ -45,7 +45,7 @@ impl Unexplained {
         Some(Unexplained { n_per_kn, share, refused, place })
     }
 
-    /// Whether noise explains it.
+    /// Returns whether noise explains it.
     pub fn is_noise(&self) -> bool {
         self.share < NOISE_SHARE_MAX
     }

@@ -1,4 +1,4 @@
-//! From the search to the answer.
+//! The answer to a finished search.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -35,7 +35,7 @@ const MOVING_MIN_S: f64 = 180.0;
 /// Share of the decrease that the library must explain when something unknown is left too.
 const LIBRARY_SHARE_MIN: f64 = 0.5;
 
-/// The answer to a finished search.
+/// Returns the answer to a finished search.
 pub fn answer(
     search: &Search,
     outcome: &SearchOutcome,
@@ -101,7 +101,7 @@ pub fn answer(
 /// The verdict in words, and what to do.
 type Words = (VerdictWords, Option<String>);
 
-/// The words where the data cannot be true.
+/// Returns the words where the data cannot be true.
 fn impossible(diagnostics: &[DatasetDiagnostic]) -> Option<Words> {
     let fundamental = diagnostics.iter().filter(|it| it.severity == Severity::Fundamental);
     let faults: Vec<String> = fundamental.map(ToString::to_string).collect();
@@ -110,7 +110,7 @@ fn impossible(diagnostics: &[DatasetDiagnostic]) -> Option<Words> {
     (!faults.is_empty()).then(|| (VerdictWords::of(words()), Some(to_do.into())))
 }
 
-/// Why nothing was scored, and what is known instead; `None` when something was.
+/// Returns why nothing was scored, and what is known instead; `None` when something was.
 fn unscored(search: &Search, score: &PredictionScore) -> Option<String> {
     if score.holdout_rmse_mps()[0].is_some() {
         return None;
@@ -130,7 +130,7 @@ fn unscored(search: &Search, score: &PredictionScore) -> Option<String> {
     Some(format!("{why}, so that nothing was scored{figure}."))
 }
 
-/// Time in s of usable motion in the fit runs.
+/// Returns the time in s of usable motion in the fit runs.
 fn moving_s(search: &Search) -> f64 {
     // A sum of nothing would be -0.
     search.problem.runs.iter().fold(0.0, |sum, run| sum + run.moving_s())
@@ -201,7 +201,8 @@ fn effect_answers(
     answers.into_iter().map(|(_, answer)| answer).collect()
 }
 
-/// The numbers of an effect by the runs held out, in the form of those of the fit runs, which are stated in a context.
+/// Returns the numbers of an effect by the runs held out, in the form of those of the fit runs, which are stated in a
+/// context.
 fn held_out_answer(
     effect: &dyn Hypothesis,
     held_out: &HeldOutEffect,
@@ -284,7 +285,7 @@ fn considered(outcome: &SearchOutcome, competing: &[CompetingHypotheses]) -> Vec
     list
 }
 
-/// The verdict in words, and what to do.
+/// Returns the verdict in words, and what to do.
 fn worded(
     search: &Search,
     outcome: &SearchOutcome,

@@ -50,7 +50,7 @@ pub struct Account {
 }
 
 impl Account {
-    /// Everything said, in the order of the work.
+    /// Returns everything said, in the order of the work.
     pub fn outcomes(&self) -> &[FieldOutcome] {
         &self.outcomes
     }
@@ -73,7 +73,7 @@ impl Account {
         self.say(FieldOutcome::Unknown { key, why: why.into() });
     }
 
-    /// A value that a field gives: taken under a key, or not known for a reason.
+    /// Returns a value that a field gives: taken under a key, or not known for a reason.
     pub(super) fn given<T>(
         &mut self,
         value: Option<T>,
@@ -103,7 +103,7 @@ impl Account {
     }
 }
 
-/// A force of an effort curve in N.
+/// Returns a force of an effort curve in N.
 pub(super) fn force_n(item: &Item) -> Result<f64, DatasetError> {
     item.number("a force in N from 0 to 1e7", 0.0..=1e7)
 }

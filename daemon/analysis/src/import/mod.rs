@@ -11,7 +11,7 @@
 //! - `rolling_stock`, `running_path`: railtoolkit's schemas
 //! - `ttobench`: TTOBench's files
 //! - `osrd`: OSRD's rolling stock
-//! - [`imported`]: what comes out
+//! - [`imported`]: the imported train or line
 
 pub mod imported;
 mod osrd;
@@ -77,7 +77,7 @@ fn refuse_xml(label: &str, text: &str) -> Result<(), DatasetError> {
     Err(SourcePosition::whole(label).problem(words))
 }
 
-/// The name of the root element; `None` for a text that is no XML.
+/// Returns the name of the root element; `None` for a text that is no XML.
 fn xml_root(text: &str) -> Option<&str> {
     let mut rest = text.trim_start();
     loop {
@@ -96,7 +96,7 @@ fn xml_root(text: &str) -> Option<&str> {
     }
 }
 
-/// The kind of a file by its keys, or of those of one project.
+/// Returns the kind of a file by its keys, or of those of one project.
 fn kind_of(root: &Item, forced: Option<Format>) -> Result<Kind, DatasetError> {
     let has = |key: &str| root.has(key);
     let recognised = if has("schema") {

@@ -35,7 +35,7 @@ const RESISTANCE_N_PER_KN: (f64, f64) = (0.1, 60.0);
 /// Where a file gives no greatest speed, one that every train reaches.
 const SPEED_MPS: f64 = 20.0;
 
-/// The train of a file.
+/// Returns the train of a file.
 pub(super) fn train(root: &Item, reading: &ImportReading) -> Result<ImportedTrain, DatasetError> {
     let mut account = Account::default();
     let mass_kg = root.required("mass", "a mass in kg from 1000 to 1e8", 1e3..=1e8)?;
@@ -78,7 +78,7 @@ pub(super) fn train(root: &Item, reading: &ImportReading) -> Result<ImportedTrai
     })
 }
 
-/// A brake alone, as `dynocar brakes` writes it.
+/// Returns a brake alone, as `dynocar brakes` writes it.
 pub(super) fn brake_alone(root: &Item) -> Result<ImportedTrain, DatasetError> {
     let mut account = Account::default();
     let brake_mps2 = Some(brake(root, "", &mut account)?);
@@ -101,7 +101,7 @@ pub(super) fn brake_alone(root: &Item) -> Result<ImportedTrain, DatasetError> {
     })
 }
 
-/// The emergency deceleration over speed; a step is one over 0.01 m/s.
+/// Returns the emergency deceleration over speed; a step is one over 0.01 m/s.
 fn brake(
     item: &Item,
     prefix: &str,
@@ -168,7 +168,7 @@ fn resistance(
     Ok(Some(taken))
 }
 
-/// The default curve of the mode that is wanted, or of the file's default mode.
+/// Returns the default curve of the mode that is wanted, or of the file's default mode.
 fn effort(
     item: &Item,
     reading: &ImportReading,

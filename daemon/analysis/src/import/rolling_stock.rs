@@ -16,7 +16,7 @@ const WITHOUT_PLACE: [(&str, &str); 4] = [
     ("train.toml holds no speed limit", "speed_limit"),
 ];
 
-/// The trains of files of one schema, whose vehicles may stand in another of the files. Without a
+/// Returns the trains of files of one schema, whose vehicles may stand in another of the files. Without a
 /// train each vehicle is one.
 pub(super) fn trains(
     roots: &[Item],
@@ -189,7 +189,7 @@ fn resistance(
     Some(Davis { a, b, c })
 }
 
-/// The sum of the units' efforts, as far as all of them have one.
+/// Returns the sum of the units' efforts, as far as all of them have one.
 fn traction(formation: &[&Vehicle], account: &mut Account) -> Option<Vec<(f64, f64)>> {
     let powered = || formation.iter().filter(|it| it.kind == Kind::Powered);
     if let Some(without) = powered().find(|it| it.effort.is_none()) {

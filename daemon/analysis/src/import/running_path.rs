@@ -22,7 +22,7 @@ struct Section {
     resistance_permille: Option<f64>,
 }
 
-/// The paths of a file.
+/// Returns the paths of a file.
 pub(super) fn lines(root: &Item) -> Result<Vec<ImportedLine>, DatasetError> {
     let mut seen: Vec<(&str, Item)> = Vec::new();
     let mut lines = Vec::new();
@@ -84,7 +84,7 @@ fn line(item: &Item, id: &str) -> Result<ImportedLine, DatasetError> {
     })
 }
 
-/// The values where they change; the last section only ends the line.
+/// Returns the values where they change; the last section only ends the line.
 fn steps(sections: &[Section], value: impl Fn(&Section) -> Option<f64>) -> Vec<(f64, f64)> {
     let mut steps: Vec<(f64, f64)> = Vec::new();
     for section in &sections[..sections.len() - 1] {
@@ -120,7 +120,7 @@ fn permille(item: &Item) -> Result<f64, DatasetError> {
     item.number(RESISTANCE, -150.0..=150.0)
 }
 
-/// A section as `[m, km/h, ‰]`.
+/// Returns a section as `[m, km/h, ‰]`.
 fn by_place(item: &Item) -> Result<Section, DatasetError> {
     let [position, speed, resistance] =
         item.tuple("[position m, speed km/h, resistance permil]")?;
@@ -131,7 +131,7 @@ fn by_place(item: &Item) -> Result<Section, DatasetError> {
     })
 }
 
-/// A section as keys and values.
+/// Returns a section as keys and values.
 fn by_keys(item: &Item) -> Result<Section, DatasetError> {
     let speed = item.get("speed").map(|it| speed_mps(&it)).transpose()?;
     let resistance = item.get("resistance").map(|it| permille(&it)).transpose()?;

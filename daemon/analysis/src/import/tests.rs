@@ -42,7 +42,7 @@ fn flat(list: &[(f64, f64)]) -> Vec<f64> {
     list.iter().flat_map(|&(at, value)| [at, value]).collect()
 }
 
-/// The reason for which a field has no place, or a key is not known.
+/// Returns the reason for which a field has no place, or a key is not known.
 fn reason<'a>(account: &'a Account, name: &str) -> &'a str {
     let of = account.outcomes().iter().find_map(|outcome| match outcome {
         FieldOutcome::Left { field, why } if field == name => Some(why.as_str()),

@@ -14,7 +14,7 @@ use crate::dataset::document::{Item, above_zero};
 use crate::dataset::keys;
 use crate::dataset::keys::track::{GRADIENT, PERMITTED_SPEED};
 
-/// The unit named under a key of a map, by the field's spelling of it.
+/// Returns the unit named under a key of a map, by the field's spelling of it.
 pub(super) fn unit(item: &Item, key: &str, dimension: Dimension) -> Result<Unit, DatasetError> {
     let stated = item.need(key, "a unit")?;
     let name = stated.text("a unit")?;
@@ -24,7 +24,7 @@ pub(super) fn unit(item: &Item, key: &str, dimension: Dimension) -> Result<Unit,
         .ok_or_else(|| stated.unknown("unit", name, Unit::of(dimension).map(|it| it.name())))
 }
 
-/// A `{ unit, value }` under a key in its dimension's base unit, when there is one; `allowed` names the
+/// Returns a `{ unit, value }` under a key in its dimension's base unit, when there is one; `allowed` names the
 /// range in it.
 pub(super) fn value(
     root: &Item,
@@ -38,7 +38,7 @@ pub(super) fn value(
     item.need("value", "a number")?.in_unit(&unit, allowed, range).map(Some)
 }
 
-/// The coefficient of resistance of a value in N/(m/s)^power, with its unit.
+/// Returns the coefficient of resistance of a value in N/(m/s)^power, with its unit.
 pub(super) fn coefficient<'t>(item: &Item<'t>, power: i32) -> Result<(f64, &'t str), DatasetError> {
     let stated = item.need("unit", "a unit")?;
     let name = stated.text("a unit")?;
@@ -64,7 +64,7 @@ pub(super) fn coefficient<'t>(item: &Item<'t>, power: i32) -> Result<(f64, &'t s
     Ok((value * factor, name))
 }
 
-/// Words that name a file: the identifier of its metadata.
+/// Returns the words that name a file: the identifier of its metadata.
 pub(super) fn id<'t>(root: &Item<'t>) -> Result<&'t str, DatasetError> {
     root.need("metadata", "keys and values with an id")?.need("id", "an identifier")?.text("an id")
 }
@@ -101,7 +101,7 @@ const TRAIN_WITHOUT_PLACE: [(&str, &str); 6] = [
 /// straight lines between them lie 0.3 % above it at most.
 const SPEED_RATIO: f64 = 1.12;
 
-/// The train of a file.
+/// Returns the train of a file.
 pub(super) fn train(root: &Item) -> Result<ImportedTrain, DatasetError> {
     let id = id(root)?;
     let mut account = Account::default();
@@ -161,7 +161,7 @@ fn resistance(
     Ok(Some(Davis { a, b, c }))
 }
 
-/// The smaller of force and power / speed, up to the greatest speed.
+/// Returns the smaller of force and power / speed, up to the greatest speed.
 fn traction(root: &Item, account: &mut Account) -> Result<Option<Vec<(f64, f64)>>, DatasetError> {
     let (force, power, top) = ("max traction force", "max traction power", "max speed");
     let force = value(root, force, Dimension::Force, "from 1 to 1e7 N", 1.0..=1e7)?;
@@ -196,7 +196,7 @@ const POSITION_MAX_M: f64 = 1e7;
 /// The sharpest radius in m of any railway is larger.
 const RADIUS_MIN_M: f64 = 10.0;
 
-/// The line of a file.
+/// Returns the line of a file.
 pub(super) fn line(root: &Item) -> Result<ImportedLine, DatasetError> {
     let id = id(root)?;
     let mut account = Account::default();
@@ -312,7 +312,7 @@ fn curves(item: &Item, length_m: f64) -> Result<Vec<TrackCurve>, DatasetError> {
     Ok(curves)
 }
 
-/// The reciprocal of a radius, which is "infinity" where the line is straight.
+/// Returns the reciprocal of a radius, which is "infinity" where the line is straight.
 fn curvature_per_m(item: &Item, unit: &Unit) -> Result<f64, DatasetError> {
     if item.text("a radius").is_ok_and(|text| text == "infinity") {
         return Ok(0.0);

@@ -64,7 +64,7 @@ pub struct DecelerationCurve {
 }
 
 impl DecelerationCurve {
-    /// The curve of a stop's samples; `None` for too few.
+    /// Returns the curve of a stop's samples; `None` for too few.
     pub fn of(samples: &[TrainSample]) -> Option<Self> {
         let mut points = smoothed(samples)?;
         let built_up = built_up(&points);
@@ -80,12 +80,12 @@ impl DecelerationCurve {
         Some(DecelerationCurve { points, built_up })
     }
 
-    /// The last moment at which the train was at least so fast in m/s.
+    /// Returns the last moment at which the train was at least so fast in m/s.
     pub fn at_speed(&self, speed_mps: f64) -> Option<&DecelerationPoint> {
         self.points.iter().rev().find(|point| point.speed_mps >= speed_mps)
     }
 
-    /// The moment of the greatest deceleration and a later one at which the brake had been eased; `None`
+    /// Returns the moment of the greatest deceleration and a later one at which the brake had been eased; `None`
     /// where it was not.
     pub fn eased(&self) -> Option<[DecelerationPoint; 2]> {
         let points = self.points.get(self.built_up?..)?;
@@ -103,12 +103,12 @@ impl DecelerationCurve {
         None
     }
 
-    /// Speed in m/s at which the brake was applied.
+    /// Returns the speed in m/s at which the brake was applied.
     pub fn from_mps(&self) -> f64 {
         self.points[0].speed_mps
     }
 
-    /// Distance in m from the application of the brake to the standstill.
+    /// Returns the distance in m from the application of the brake to the standstill.
     pub fn distance_m(&self) -> f64 {
         let pairs = self.points.windows(2);
         pairs
@@ -120,7 +120,7 @@ impl DecelerationCurve {
     }
 }
 
-/// The moment after which the deceleration goes on as the brake gives it: a while after it first
+/// Returns the moment after which the deceleration goes on as the brake gives it: a while after it first
 /// reached what follows.
 fn built_up(points: &[DecelerationPoint]) -> Option<usize> {
     let reaches = |from: usize| {
@@ -137,7 +137,7 @@ fn built_up(points: &[DecelerationPoint]) -> Option<usize> {
     points.iter().position(|point| point.time_s >= reached_s + SETTLES_S)
 }
 
-/// Speed and deceleration at every sample, given all of them; `None` for too few.
+/// Returns the speed and deceleration at every sample, given all of them; `None` for too few.
 fn smoothed(samples: &[TrainSample]) -> Option<Vec<DecelerationPoint>> {
     if samples.len() < SAMPLES_MIN {
         return None;
@@ -176,7 +176,7 @@ struct Pass {
 }
 
 impl Pass {
-    /// The logarithm of the likelihood; remembers every moment where wanted.
+    /// Returns the logarithm of the likelihood; remembers every moment where wanted.
     fn likelihood(
         &self,
         samples: &[TrainSample],

@@ -41,7 +41,7 @@ pub struct MeasuredResponse {
 }
 
 impl MeasuredResponse {
-    /// That of some stops, each by the time it loses and the moment of that loss, as a ramp has them.
+    /// Returns that of some stops, each by the time it loses and the moment of that loss, as a ramp has them.
     fn of(built: &[(&DecelerationCurve, &DecelerationPoint)]) -> Self {
         let count = built.len() as f64;
         let losses: Vec<[f64; 2]> = built.iter().map(|(curve, from)| lost(curve, from)).collect();
@@ -59,19 +59,19 @@ impl MeasuredResponse {
         }
     }
 
-    /// The same for a stop that is asked about.
+    /// Returns the same for a stop that is asked about.
     pub fn shared(&self) -> BrakeResponse {
         let MeasuredResponse { dead_time_s, build_up_s, std_s } = *self;
         BrakeResponse { dead_time_s, build_up_s, std_s, ..BrakeResponse::IMMEDIATE }
     }
 
-    /// Time in s that a stop loses, as if the brake then came at once.
+    /// Returns the time in s that a stop loses, as if the brake then came at once.
     pub fn lost_s(&self) -> f64 {
         self.dead_time_s + 0.5 * self.build_up_s
     }
 }
 
-/// Time in s that a stop lost until its brake had built up, and the first moment of that loss in s².
+/// Returns the time in s that a stop lost until its brake had built up, and the first moment of that loss in s².
 fn lost(curve: &DecelerationCurve, from: &DecelerationPoint) -> [f64; 2] {
     let lost_s = from.time_s - (curve.from_mps() - from.speed_mps) / from.deceleration_mps2;
     let pairs = curve.points.windows(2).take_while(|it| it[1].time_s <= from.time_s);
@@ -124,7 +124,7 @@ pub struct Gradient {
 }
 
 impl DecelerationLaw {
-    /// The law of some stops, where stops are assumed to repeat within a relative standard
+    /// Returns the law of some stops, where stops are assumed to repeat within a relative standard
     /// deviation until there are enough to estimate it; `None` without a stop whose brake builds up.
     pub fn of(curves: &[DecelerationCurve], assumed_repeatability: f64) -> Option<Self> {
         let built: Vec<(&DecelerationCurve, &DecelerationPoint)> = curves
@@ -189,13 +189,13 @@ impl DecelerationLaw {
         }
     }
 
-    /// The fastest speed in m/s that a stop was seen from.
+    /// Returns the fastest speed in m/s that a stop was seen from.
     pub fn fastest_mps(&self) -> f64 {
         self.points[self.points.len() - 1].speed_mps
     }
 
-    /// How long the next stop from a speed on a gradient is; `None` above the speeds of the stops, and where it does
-    /// not stop.
+    /// Returns how long the next stop from a speed on a gradient is; `None` above the speeds of the stops, and where it
+    /// does not stop.
     pub fn stopping_distance(
         &self,
         from_mps: f64,

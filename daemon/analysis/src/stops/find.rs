@@ -1,4 +1,4 @@
-//! Where in a run the brake was applied until the train stood, in full or as a driver wanted, and when its traction was gone.
+//! Brakings to standstill in a run, in full or as a driver wanted, and the moment at which the traction ended.
 
 use std::ops::RangeInclusive;
 
@@ -69,7 +69,7 @@ pub struct StopSpan {
     pub found_by: FoundBy,
 }
 
-/// The samples with a speed, each later than the one before, with the standstills that a pausing recorder left
+/// Returns the samples with a speed, each later than the one before, with the standstills that a pausing recorder left
 /// out.
 pub fn usable(samples: &[TrainSample]) -> Vec<TrainSample> {
     let mut usable: Vec<TrainSample> = Vec::with_capacity(samples.len());
@@ -91,7 +91,7 @@ pub fn usable(samples: &[TrainSample]) -> Vec<TrainSample> {
     usable
 }
 
-/// The stops of a run of usable samples, in order.
+/// Returns the stops of a run of usable samples, in order.
 pub fn find(
     samples: &[TrainSample],
     brake: Option<&EffortCurve>,
@@ -139,14 +139,14 @@ pub fn find(
     runs.map(stop).collect()
 }
 
-/// The time in s between most samples.
+/// Returns the time in s between most samples.
 fn usual_interval_s(samples: &[TrainSample]) -> f64 {
     let mut intervals: Vec<f64> =
         samples.windows(2).map(|it| 1e-9 * (it[1].time_ns - it[0].time_ns) as f64).collect();
     middle(&mut intervals).unwrap_or(0.0)
 }
 
-/// The first sample from which on the brake is applied until the end of a stop.
+/// Returns the first sample from which on the brake is applied until the end of a stop.
 fn start(
     samples: &[TrainSample],
     end: usize,
@@ -160,13 +160,13 @@ fn start(
     from
 }
 
-/// Whether a sample goes on with the motion that the one before it belongs to.
+/// Returns whether a sample goes on with the motion that the one before it belongs to.
 fn follows(samples: &[TrainSample], index: usize, gap_max_s: f64) -> bool {
     let is_moving = samples[index - 1].speed_mps > STANDING_MPS;
     is_moving && time_s(samples, index) - time_s(samples, index - 1) <= gap_max_s
 }
 
-/// The last sample at which the speed began to fall to a standstill, with the brake eased on the way or not.
+/// Returns the last sample at which the speed began to fall to a standstill, with the brake eased on the way or not.
 fn fall(samples: &[TrainSample], end: usize, gap_max_s: f64) -> usize {
     let mut from = end;
     loop {
@@ -197,7 +197,8 @@ fn fall(samples: &[TrainSample], end: usize, gap_max_s: f64) -> usize {
     from
 }
 
-/// Where between its first two samples a stop began, that goes on as it is seen from the second one on: its time in ns.
+/// Returns where between its first two samples a stop began, that goes on as it is seen from the second one on: its
+/// time in ns.
 pub fn began_ns(samples: &[TrainSample]) -> i64 {
     let [first, second, .., _] = samples else { return samples[0].time_ns };
     let over_s = 1e-9 * (second.time_ns - first.time_ns) as f64;
@@ -211,7 +212,7 @@ pub fn began_ns(samples: &[TrainSample]) -> i64 {
     first.time_ns + (1e9 * late_s) as i64
 }
 
-/// Whether the brake is applied at each sample; `None` where no sample shows it.
+/// Returns whether the brake is applied at each sample; `None` where no sample shows it.
 fn applied(
     samples: &[TrainSample],
     brake: Option<&EffortCurve>,
@@ -230,7 +231,7 @@ fn applied(
     is_known.then_some(applied)
 }
 
-/// Whether a train brakes in the time after a sample, or until it stands.
+/// Returns whether a train brakes in the time after a sample, or until it stands.
 fn loses_speed(samples: &[TrainSample], index: usize) -> bool {
     let later_s = time_s(samples, index) + LOOK_BACK_S;
     let is_over =
@@ -262,15 +263,15 @@ pub struct CutOff {
 }
 
 impl CutOff {
-    /// That of some times; `None` without one.
+    /// Returns that of some times; `None` without one.
     pub fn of(times_s: impl Iterator<Item = f64> + Clone) -> Option<Self> {
         let [least_s, greatest_s] = span(times_s.clone())?;
         Some(CutOff { stops: times_s.count(), least_s, greatest_s })
     }
 }
 
-/// Time in s from a sample, that of the brake's command, to the first without traction; `None` where the force is not
-/// recorded, did not act at the command, or did not go. A handle is no force.
+/// Returns the time in s from a sample, that of the brake's command, to the first without traction; `None` where the
+/// force is not recorded, did not act at the command, or did not go. A handle is no force.
 pub fn cut_off_s(samples: &[TrainSample], command: usize, source: ForceSource) -> Option<f64> {
     if matches!(source, ForceSource::Handle | ForceSource::None) {
         return None;
@@ -292,7 +293,7 @@ mod tests {
     use super::*;
     use dynocar_shared::TrainId;
 
-    /// A minute at 20 m/s, a stop at 1 m/s², ten seconds of standing; the brake as given.
+    /// Returns a minute at 20 m/s, a stop at 1 m/s², ten seconds of standing; the brake as given.
     fn run(brake_n: impl Fn(f64) -> Option<f64>) -> Vec<TrainSample> {
         let sample = |k: i32| {
             let time_s = 0.2 * f64::from(k);
@@ -312,7 +313,7 @@ mod tests {
         find(samples, brake.as_ref(), &FindSettings::default())
     }
 
-    /// Where the brake was applied in full, in s.
+    /// Returns where the brake was applied in full, in s.
     fn starts_s(samples: &[TrainSample]) -> Vec<(f64, FoundBy)> {
         let stops = found(samples);
         let full =

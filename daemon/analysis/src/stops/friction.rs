@@ -81,7 +81,7 @@ pub fn friction(
     points
 }
 
-/// The train with a gear that gives a stop's mean deceleration at the declared friction.
+/// Returns the train with a gear that gives a stop's mean deceleration at the declared friction.
 fn with_brake(train: &TrainModel, curve: &DecelerationCurve) -> Option<TrainModel> {
     let from = &curve.points[curve.built_up?];
     let last = curve.points.last()?;

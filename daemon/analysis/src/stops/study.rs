@@ -80,7 +80,7 @@ impl Study {
     }
 }
 
-/// The stops of a run, each with its curve.
+/// Returns the stops of a run, each with its curve.
 fn found_in(
     dataset: &Dataset,
     run: &Run,
@@ -159,7 +159,7 @@ fn level(curve: &mut DecelerationCurve, samples: &[TrainSample], dataset: &Datas
     Some(permille.iter().sum::<f64>() / permille.len() as f64)
 }
 
-/// Why a stop shows no law of the brake; `full` is its part under all of the brake.
+/// Returns why a stop shows no law of the brake; `full` is its part under all of the brake.
 fn why_no_law(
     full: Option<&DecelerationCurve>,
     found_by: FoundBy,
@@ -184,7 +184,7 @@ fn why_no_law(
     ))
 }
 
-/// Deceleration at whole m/s that the train passed.
+/// Returns the deceleration at whole m/s that the train passed.
 fn decelerations(curve: &DecelerationCurve) -> Vec<DecelerationPoint> {
     let fastest = curve.from_mps().floor() as u32;
     let at = |k: u32| {

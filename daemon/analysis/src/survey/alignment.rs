@@ -57,34 +57,34 @@ impl Alignment {
         Some(Alignment { nodes_m, step_m, cells })
     }
 
-    /// The same alignment driven the other way round.
+    /// Returns the same alignment driven the other way round.
     pub fn reversed(&self) -> Option<Alignment> {
         Alignment::through(&self.nodes_m.iter().rev().copied().collect::<Vec<_>>())
     }
 
-    /// Its nodes, east and north in m.
+    /// Returns its nodes, east and north in m.
     pub fn nodes_m(&self) -> &[[f64; 2]] {
         &self.nodes_m
     }
 
-    /// Distance in m between its nodes.
+    /// Returns the distance in m between its nodes.
     pub fn step_m(&self) -> f64 {
         self.step_m
     }
 
-    /// Its length in m.
+    /// Returns its length in m.
     pub fn length_m(&self) -> f64 {
         self.step_m * (self.nodes_m.len() - 1) as f64
     }
 
-    /// The point at a chainage in m, straight on beyond the ends.
+    /// Returns the point at a chainage in m, straight on beyond the ends.
     pub fn at(&self, chainage_m: f64) -> [f64; 2] {
         let segment = self.segment(chainage_m);
         let share = chainage_m / self.step_m - segment as f64;
         between(self.nodes_m[segment], self.nodes_m[segment + 1], share)
     }
 
-    /// The direction at a chainage, as a unit vector.
+    /// Returns the direction at a chainage, as a unit vector.
     pub fn direction(&self, chainage_m: f64) -> [f64; 2] {
         let segment = self.segment(chainage_m);
         let (from, to) = (self.nodes_m[segment], self.nodes_m[segment + 1]);
@@ -159,7 +159,7 @@ pub struct FoundCurve {
     pub radius_m: f64,
 }
 
-/// The curves of an alignment, one after the other.
+/// Returns the curves of an alignment, one after the other.
 pub fn curves(alignment: &Alignment) -> Vec<FoundCurve> {
     let step_m = alignment.step_m();
     let count = alignment.nodes_m().len();
@@ -198,7 +198,7 @@ pub fn curves(alignment: &Alignment) -> Vec<FoundCurve> {
     found
 }
 
-/// All the turning of an alignment in rad.
+/// Returns all the turning of an alignment in rad.
 pub fn turning_rad(alignment: &Alignment) -> f64 {
     let nodes = alignment.nodes_m().len();
     let at = |node: usize| alignment.direction((node as f64 + 0.5) * alignment.step_m());

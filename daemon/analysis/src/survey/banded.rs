@@ -27,7 +27,7 @@ pub struct NotPositive {
 }
 
 impl Banded {
-    /// A matrix of zeros.
+    /// Returns a matrix of zeros.
     pub fn zeros(size: usize, width: usize) -> Self {
         Banded { size, width, below: vec![0.0; size * (width + 1)] }
     }
@@ -105,7 +105,7 @@ impl BandedCholesky {
         }
     }
 
-    /// The inverse within the band, by the recursion of Takahashi, Fagan and Chin (1973): as a
+    /// Returns the inverse within the band, by the recursion of Takahashi, Fagan and Chin (1973): as a
     /// matrix in the same storage.
     pub fn inverse_band(&self) -> Banded {
         let Banded { size, width, below } = &self.lower;
@@ -131,7 +131,7 @@ impl BandedCholesky {
 }
 
 impl Banded {
-    /// The variance of a sparse combination under this matrix as covariance.
+    /// Returns the variance of a sparse combination under this matrix as covariance.
     pub fn variance_of(&self, row: &[(usize, f64)]) -> f64 {
         let mut sum = 0.0;
         for &(i, one) in row {

@@ -1,4 +1,4 @@
-//! Whether both directions take one track, and which.
+//! Decides whether both directions run on one track, and which stretches they share.
 
 use super::alignment::Alignment;
 use super::recording::SAME_ALIGNMENT_M;
@@ -78,8 +78,8 @@ pub fn compare(growing: &Alignment, falling: &Alignment) -> Option<Compared> {
     Some(Compared { start_chainage_m, joined })
 }
 
-/// Distance in m along the growing alignment to a node and on along the falling one from its node to its start: the
-/// same wherever both take one track.
+/// Returns the distance in m along the growing alignment to a node and on along the falling one from its node to its
+/// start: the same wherever both take one track.
 fn there_and_back_m(growing: &Alignment, ahead: usize, falling: &Alignment, back: usize) -> f64 {
     ahead as f64 * growing.step_m() + back as f64 * falling.step_m()
 }

@@ -56,7 +56,7 @@ pub fn align(first: Alignment, passes: &[SurveyPass], recordings: &[SurveyRecord
     alignment
 }
 
-/// Mean speed in m/s while moving.
+/// Returns the mean speed in m/s while moving.
 fn mean_speed(passes: &[SurveyPass], recordings: &[SurveyRecording]) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for pass in passes {
@@ -69,7 +69,7 @@ fn mean_speed(passes: &[SurveyPass], recordings: &[SurveyRecording]) -> f64 {
     if count > 0.0 { sum / count } else { 10.0 }
 }
 
-/// The alignment moved sideways to the middle of the passes, and smoothed.
+/// Returns the alignment moved sideways to the middle of the passes, and smoothed.
 fn moved(alignment: &Alignment, placed: &[Vec<PlacedFix>], speed_mps: f64) -> Option<Alignment> {
     let count = alignment.nodes_m().len();
     let mut left_m: Vec<Vec<f64>> = vec![Vec::new(); count];

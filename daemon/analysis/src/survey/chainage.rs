@@ -1,4 +1,4 @@
-//! The chainage of every row: what the wheels count, corrected by what GNSS measures.
+//! The chainage of every row: the distance counted by the wheels, corrected by GNSS.
 //!
 //! The wheels count the distance with a scale error that stays over a pass and slips that add up like
 //! a random walk. A fix lies `lag * speed` behind, since it is older than its stamp, and errs by

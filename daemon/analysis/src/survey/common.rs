@@ -26,13 +26,13 @@ impl Common {
         self.0[3]
     }
 
-    /// Seconds by which forces act before their stamp: the force at a time is the one stamped
+    /// Returns the seconds by which forces act before their stamp: the force at a time is the one stamped
     /// so much later.
     pub fn delay_s(&self) -> f64 {
         self.0[4]
     }
 
-    /// Mass of a passenger in kg.
+    /// Returns the mass of a passenger in kg.
     pub fn passenger_kg(&self) -> f64 {
         self.0[5]
     }
@@ -58,13 +58,13 @@ pub struct Prior {
 }
 
 impl Prior {
-    /// The declared values.
+    /// Returns the declared values.
     pub fn start(&self) -> Common {
         let [a, b, c] = self.davis;
         Common(SVector::from([a, b, c, 0.0, 0.0, self.passenger_kg]))
     }
 
-    /// Standard deviations of the unknowns before the recordings.
+    /// Returns the standard deviations of the unknowns before the recordings.
     ///
     /// The resistance at the typical speed is believed within half of itself and 1 N/kN, however
     /// it is shared out between a, b and c.
@@ -88,7 +88,7 @@ impl Prior {
         (SMatrix::from_diagonal(&weights), weights.component_mul(&away))
     }
 
-    /// Force in N for each kg, without the gradient.
+    /// Returns the force in N for each kg, without the gradient.
     pub fn unit_force(&self, observation: &BlockDifference, common: &Common) -> f64 {
         let [a, b, c] = common.davis();
         let speed = observation.speed_mps;
@@ -96,7 +96,7 @@ impl Prior {
             + GRAVITY_MPS2 * (a + speed * (b + speed * c) + observation.curve_n_per_kn) / 1000.0
     }
 
-    /// Mass in kg at an observation.
+    /// Returns the mass in kg at an observation.
     pub fn mass_kg(&self, observation: &BlockDifference, common: &Common) -> f64 {
         let counted = observation.passengers * (common.passenger_kg() - self.passenger_kg);
         observation.mass_kg + self.mass_kg * common.mass_share() + counted

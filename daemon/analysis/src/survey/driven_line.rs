@@ -45,7 +45,7 @@ pub struct FallingAlignment {
 }
 
 impl Alignments {
-    /// The alignment of a direction.
+    /// Returns the alignment of a direction.
     pub fn of(&self, direction: i8) -> Option<&Alignment> {
         match direction {
             1 => Some(&self.growing),
@@ -53,7 +53,7 @@ impl Alignments {
         }
     }
 
-    /// Chainage in m of a place along the alignment of a direction.
+    /// Returns the chainage in m of a place along the alignment of a direction.
     pub fn chainage_m(&self, direction: i8, along_m: f64) -> f64 {
         let on_plane_m = match (&self.falling, direction) {
             (Some(falling), -1) => falling.start_chainage_m - along_m,
@@ -62,7 +62,8 @@ impl Alignments {
         self.chainage_per_m * on_plane_m
     }
 
-    /// Place in m along the alignment of a direction of a chainage in m: [`Alignments::chainage_m`] turned round.
+    /// Returns the place in m along the alignment of a direction of a chainage in m: [`Alignments::chainage_m`] turned
+    /// round.
     pub fn along_m(&self, direction: i8, chainage_m: f64) -> f64 {
         let on_plane_m = chainage_m / self.chainage_per_m;
         match (&self.falling, direction) {
@@ -71,12 +72,12 @@ impl Alignments {
         }
     }
 
-    /// Length in m of the line by its chainage.
+    /// Returns the length in m of the line by its chainage.
     pub fn length_m(&self) -> f64 {
         self.chainage_per_m * self.growing.length_m()
     }
 
-    /// True when both directions share one profile.
+    /// Returns whether both directions share one profile.
     pub fn is_one_track(&self) -> bool {
         self.falling.as_ref().is_none_or(|falling| falling.is_same)
     }
@@ -132,7 +133,7 @@ pub fn find(
     Some(Alignments { falling, ..alone(growing) })
 }
 
-/// The alignment of a direction from its own parts: where they differ from the other direction's,
+/// Returns the alignment of a direction from its own parts: where they differ from the other direction's,
 /// they know better. A single part cannot say what of it is the line.
 fn alignment_of(
     template: &Alignment,
@@ -148,7 +149,7 @@ fn alignment_of(
     align(first, &passes, recordings)
 }
 
-/// The passes that an alignment is laid through.
+/// Returns the passes that an alignment is laid through.
 fn passes(
     alignment: &Alignment,
     direction: i8,
@@ -171,7 +172,7 @@ fn rows_of(part: &RecordingPart, recordings: &[SurveyRecording]) -> std::ops::Ra
     first..end
 }
 
-/// The part that the others follow furthest, cut to what at least one other drives too.
+/// Returns the part that the others follow furthest, cut to what at least one other drives too.
 fn template(
     recording_parts: &[RecordingPart],
     recordings: &[SurveyRecording],
@@ -225,7 +226,7 @@ fn covered(alignment: &Alignment, own: usize, recording_parts: &[Vec<[f64; 2]>])
     counts
 }
 
-/// The parts that run along an alignment driven in its direction, with their rows on it.
+/// Returns the parts that run along an alignment driven in its direction, with their rows on it.
 fn along(
     alignment: &Alignment,
     direction: i8,
@@ -252,7 +253,7 @@ fn pass_along(
     (covered_m >= least_m).then_some(pass)
 }
 
-/// The pass that a part of any role is, if it is one.
+/// Returns the pass that a part of any role is, if it is one.
 pub fn pass_of(
     alignments: &Alignments,
     part: &RecordingPart,

@@ -16,7 +16,7 @@ pub struct LocalPlane {
 }
 
 impl LocalPlane {
-    /// A plane around a point.
+    /// Returns a plane around a point.
     pub fn around(latitude_deg: f64, longitude_deg: f64, height_m: f64) -> Self {
         LocalPlane { latitude_deg, longitude_deg, height_m }
     }

@@ -1,5 +1,5 @@
-//! From passes with a chainage to a profile: how smooth it is; what the friction brake does, from what the balance lacks
-//! under its pressure.
+//! Learning a profile from passes with a chainage: its smoothness, and the force of the friction brake from the balance
+//! under brake pressure.
 
 use super::banded::NotPositive;
 use super::observation::BlockDifference;
@@ -71,7 +71,7 @@ pub fn learn(
     Ok(LearnedProfile { profile, walk_per_m, left_out_n, brake })
 }
 
-/// True when every alignment has two passes, so that one can be left out.
+/// Returns whether every alignment has two passes, so that one can be left out.
 fn can_leave_out(evidence: &ProfileEvidence) -> bool {
     let mut passes = std::collections::BTreeMap::<usize, usize>::new();
     for course in &evidence.courses {
@@ -80,7 +80,7 @@ fn can_leave_out(evidence: &ProfileEvidence) -> bool {
     passes.values().all(|&count| count >= 2)
 }
 
-/// Number of the group in which an observation is left out.
+/// Returns the number of the group in which an observation is left out.
 fn group(evidence: &ProfileEvidence, observation: &BlockDifference, by_pass: bool) -> u32 {
     if !by_pass {
         return (observation.along_m / BLOCK_M).max(0.0) as u32 % FOLDS;
@@ -90,7 +90,7 @@ fn group(evidence: &ProfileEvidence, observation: &BlockDifference, by_pass: boo
     if passes <= FOLDS { observation.pass } else { (observation.pass / 2) % FOLDS }
 }
 
-/// The walk under which what was left out is predicted best: how smooth a line is, some passes of it show.
+/// Returns the walk under which what was left out is predicted best: how smooth a line is, some passes of it show.
 fn smoothest(evidence: &ProfileEvidence) -> Result<f64, NotPositive> {
     let few = evidence.of_few_passes();
     let evidence = if can_leave_out(&few) { &few } else { evidence };
@@ -116,7 +116,7 @@ fn smoothest(evidence: &ProfileEvidence) -> Result<f64, NotPositive> {
     Ok(best.map_or(WALKS_PER_M[0], |(_, walk_per_m)| walk_per_m))
 }
 
-/// How far each pass is predicted by the others.
+/// Returns how far each pass is predicted by the others.
 fn left_out(evidence: &ProfileEvidence, walk_per_m: f64) -> Result<Vec<f64>, NotPositive> {
     let passes = evidence.courses.len();
     let mut sums = vec![(0.0, 0usize); passes];
@@ -156,7 +156,7 @@ pub struct FoundBrake {
     pub release_pa: f64,
 }
 
-/// The pressure in Pa above which a friction brake may act in some recordings: by those under strong traction.
+/// Returns the pressure in Pa above which a friction brake may act in some recordings: by those under strong traction.
 pub fn acting_from_pa<'r>(raws: impl Iterator<Item = &'r RawRecording>) -> f64 {
     let mut under_traction = Vec::new();
     for raw in raws.filter(|raw| !raw.friction_pa.is_empty()) {
@@ -171,7 +171,7 @@ pub fn acting_from_pa<'r>(raws: impl Iterator<Item = &'r RawRecording>) -> f64 {
     share_of(&under_traction, 0.95).max(0.0) + MARGIN_PA
 }
 
-/// A straight line through (pressure in Pa, missing retarding force in N), robust to single
+/// Returns a straight line through (pressure in Pa, missing retarding force in N), robust to single
 /// wild ones; `None` where no brake shows.
 pub fn found_brake(points: &[(f64, f64)]) -> Option<FoundBrake> {
     if points.len() < OBSERVATIONS_MIN {

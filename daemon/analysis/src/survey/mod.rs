@@ -10,7 +10,7 @@
 //! - [`recording`], [`geodesy`]: recordings and their one-way parts, on a plane in metres
 //! - [`alignment`], `silence`, `tracking`, `centring`, `both_directions`, [`driven_line`]: the line that
 //!   is driven repeatedly
-//! - [`chainage`]: a chainage for every row; [`stops`]: what it shows
+//! - [`chainage`]: a chainage for every row; [`stops`]: places where the passes stop
 //! - [`observation`], [`common`], [`profile`], [`learn`]: gradient, resistance, mass,
 //!   time offset and friction brake from the balance of forces; [`normal`], [`banded`]: its unknown heights,
 //!   their equations and the solver

@@ -135,7 +135,7 @@ pub struct HeightSolution {
 }
 
 impl HeightSolution {
-    /// Standard deviations of the common unknowns.
+    /// Returns the standard deviations of the common unknowns.
     pub fn common_std(&self) -> Common {
         Common(self.covariance.diagonal().map(|variance| variance.max(0.0).sqrt()))
     }
@@ -170,7 +170,7 @@ pub struct LineCourse {
 }
 
 impl LineCourse {
-    /// Place in m along the block.
+    /// Returns the place in m along the block.
     pub fn in_block(&self, along_m: f64) -> f64 {
         self.against_from_m.map_or(along_m, |length_m| length_m - along_m)
     }
@@ -190,7 +190,7 @@ impl HeightLayout {
         HeightLayout { blocks, start_m, vehicle_m }
     }
 
-    /// Number of heights.
+    /// Returns the number of heights.
     pub fn size(&self) -> usize {
         self.blocks.iter().map(|block| block.1).sum()
     }
@@ -239,7 +239,7 @@ impl HeightLayout {
         }
     }
 
-    /// Variance of the mean gradient over 100 m around each piece between neighbouring
+    /// Returns the variance of the mean gradient over 100 m around each piece between neighbouring
     /// heights: between two heights alone the forces show little, and nobody feels it.
     pub fn gradient_variances(&self, solution: &HeightSolution) -> Vec<Vec<f64>> {
         let HeightSolution { columns, covariance, .. } = solution;

@@ -43,7 +43,7 @@ pub struct BlockDifference {
     pub passengers: f64,
 }
 
-/// The observations of a pass with blocks of `block_s`; `speed_factor` is true over recorded speed.
+/// Returns the observations of a pass with blocks of `block_s`; `speed_factor` is true over recorded speed.
 pub fn observations(
     raw: &RawRecording,
     chained: &Chained,
@@ -76,7 +76,7 @@ fn period(time_s: &[f64]) -> f64 {
     middle(&mut steps).map_or(1.0, |step_s| step_s.max(1e-3))
 }
 
-/// The difference of the two blocks of a window; `None` where the vehicle stands or values are
+/// Returns the difference of the two blocks of a window; `None` where the vehicle stands or values are
 /// missing.
 fn observe(
     raw: &RawRecording,

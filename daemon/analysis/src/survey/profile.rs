@@ -88,7 +88,7 @@ pub struct HeightProfile {
 /// Which observations count.
 pub type Fold<'f> = &'f (dyn Fn(&BlockDifference) -> bool + Sync);
 
-/// Whether a pass is one of the few, evenly chosen and of both directions alike, that show what is a property
+/// Returns whether a pass is one of the few, evenly chosen and of both directions alike, that show what is a property
 /// of the line or of the recording, and no number to be averaged.
 pub fn is_one_of_few(pass: usize, passes: usize) -> bool {
     // Both directions of a line come in turns.
@@ -267,7 +267,7 @@ impl ProfileEvidence {
         state.common.0[3] += mean;
     }
 
-    /// Residuals in N with their observations.
+    /// Returns the residuals in N with their observations.
     pub fn residuals<'e>(
         &'e self,
         profile: &'e HeightProfile,
@@ -298,7 +298,7 @@ impl ProfileEvidence {
 }
 
 impl HeightProfile {
-    /// Weight of a residual in N: Student's distribution.
+    /// Returns the weight of a residual in N: Student's distribution.
     fn weight(&self, residual_n: f64) -> f64 {
         let ratio = residual_n / self.residual_n;
         (TAIL + 1.0) / (TAIL + ratio * ratio) / self.residual_n.powi(2)

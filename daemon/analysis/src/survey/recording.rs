@@ -90,14 +90,14 @@ impl<'r> SurveyRecording<'r> {
         SurveyRecording { raw, travelled_m, fixes }
     }
 
-    /// The first row at or past a distance in m.
+    /// Returns the first row at or past a distance in m.
     pub fn row_at(&self, travelled_m: f64) -> usize {
         self.travelled_m
             .partition_point(|&travelled| travelled < travelled_m)
             .min(self.travelled_m.len().saturating_sub(1))
     }
 
-    /// Length in m of the whole distance.
+    /// Returns the length in m of the whole distance.
     pub fn length_m(&self) -> f64 {
         self.travelled_m.last().copied().unwrap_or(0.0)
     }
@@ -118,7 +118,7 @@ impl<'r> SurveyRecording<'r> {
     }
 }
 
-/// The plane around the middle of all fixes; `None` without any.
+/// Returns the plane around the middle of all fixes; `None` without any.
 pub fn plane_of(recordings: &[RawRecording]) -> Option<LocalPlane> {
     let median = |values: fn(&RawRecording) -> &Vec<f64>| {
         let all = recordings.iter().flat_map(values);
@@ -231,7 +231,7 @@ fn confirmed(twins: &[Option<usize>], from: usize) -> Option<Return> {
     Some(Return { left: twins[back]?, back: from + back, is_opposite: last < first })
 }
 
-/// Distance in m where a recording stood longest between two paths; `None` when it did not stand.
+/// Returns the distance in m where a recording stood longest between two paths; `None` when it did not stand.
 fn longest_stand(recording: &SurveyRecording, from_m: f64, to_m: f64) -> Option<f64> {
     let raw = recording.raw;
     let rows = recording.row_at(from_m)..recording.row_at(to_m);

@@ -1,4 +1,4 @@
-//! Where a receiver was silent, the path of one pass is that of another.
+//! Gaps of a receiver, filled with the path of another pass.
 
 use super::geodesy::distance_squared;
 use super::recording::{RecordingPart, SAME_ALIGNMENT_M, SurveyRecording};
@@ -35,7 +35,7 @@ pub fn trace(part: &RecordingPart, recordings: &[SurveyRecording], step_m: f64) 
     within.map(|(travelled_m, at_m)| TracePoint { at_m, is_open: is_open(travelled_m) }).collect()
 }
 
-/// The path of one trace, with what it leaves open taken from others, whichever is the shortest path
+/// Returns the path of one trace, with what it leaves open taken from others, whichever is the shortest path
 /// between the ends of the silence. Where no other knows, the straight line stays.
 pub fn filled(one: usize, traces: &[Vec<TracePoint>]) -> Vec<[f64; 2]> {
     let own = &traces[one];
@@ -90,7 +90,7 @@ fn between(ends: [[f64; 2]; 2], trace: &[TracePoint]) -> Option<(f64, Vec<[f64; 
 mod tests {
     use super::*;
 
-    /// A quarter of a circle of 1 km, 20 m from point to point, `left_m` beside it.
+    /// Returns a quarter of a circle of 1 km, 20 m from point to point, `left_m` beside it.
     fn quarter(left_m: f64, open: std::ops::Range<usize>) -> Vec<TracePoint> {
         let point = |k: usize| {
             let angle = 0.02 * k as f64;
@@ -101,7 +101,7 @@ mod tests {
         (0..79).map(point).collect()
     }
 
-    /// The same with a straight line over what is open.
+    /// Returns the same with a straight line over what is open.
     fn silent(open: std::ops::Range<usize>) -> Vec<TracePoint> {
         let mut trace = quarter(0.0, open.clone());
         let (from, to) = (trace[open.start - 1].at_m, trace[open.end].at_m);

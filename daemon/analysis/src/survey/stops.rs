@@ -1,4 +1,4 @@
-//! Where the passes stand.
+//! Places where the passes stop.
 
 use dynocar_model::terms::wheel::STILL_MPS;
 use serde::Serialize;
@@ -28,7 +28,7 @@ pub struct SurveyedStop {
     pub stands: usize,
 }
 
-/// Chainages in m at which a trip stands: for some seconds, or with a door open where doors are
+/// Returns the chainages in m at which a trip stands: for some seconds, or with a door open where doors are
 /// recorded.
 pub fn stands(raw: &RawRecording, first_row: usize, chainage_m: &[f64]) -> Vec<f64> {
     let has_doors = raw.door_open.iter().any(|door| *door > 0.5);

@@ -145,7 +145,7 @@ pub fn survey(
     Ok(Survey { plane, alignments, trips, not_used, stops, wheels, scale_std, profile })
 }
 
-/// Standard deviation of an alignment's length as a share of it.
+/// Returns the standard deviation of an alignment's length as a share of it.
 fn length_std(alignments: &Alignments) -> f64 {
     LATERAL_STD_M * turning_rad(&alignments.growing) / alignments.growing.length_m()
 }
@@ -175,7 +175,7 @@ fn found_stops(
     found
 }
 
-/// The profile from the fit trips.
+/// Returns the profile from the fit trips.
 fn profile(
     recordings: &[SurveyRecording],
     vehicle: &Vehicle,
@@ -241,7 +241,7 @@ fn profile(
     Ok(SurveyedProfile { learned, curves, trips: fit })
 }
 
-/// Length in s of the shortest blocks of which residuals do not alternate.
+/// Returns the length in s of the shortest blocks of which residuals do not alternate.
 fn shortest_block_s(
     evidence: &mut ProfileEvidence,
     observed: impl Fn(f64) -> Vec<BlockDifference>,
@@ -260,7 +260,7 @@ fn shortest_block_s(
     Ok(longest_s)
 }
 
-/// Where a direction lies in the profile.
+/// Returns where a direction lies in the profile.
 fn course(direction: i8, alignments: &Alignments) -> LineCourse {
     match (direction, alignments.is_one_track()) {
         (1, _) => LineCourse { block: 0, against_from_m: None },
@@ -269,7 +269,7 @@ fn course(direction: i8, alignments: &Alignments) -> LineCourse {
     }
 }
 
-/// Mean curvature in 1/m along a vehicle.
+/// Returns the mean curvature in 1/m along a vehicle.
 fn curvature<'c>(curves: impl Iterator<Item = &'c FoundCurve>, at_m: f64, vehicle_m: f64) -> f64 {
     let (rear, front) = (at_m - 0.5 * vehicle_m, at_m + 0.5 * vehicle_m);
     let inside = |curve: &FoundCurve| {

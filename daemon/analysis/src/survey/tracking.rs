@@ -88,7 +88,7 @@ fn follow_from(
     (placed, fixes.len())
 }
 
-/// The first fix from which on a recording follows an alignment for a while, and what its alignment lacks of
+/// Returns the first fix from which on a recording follows an alignment for a while, and what its alignment lacks of
 /// the chainage in m.
 fn found(
     recording: &SurveyRecording,

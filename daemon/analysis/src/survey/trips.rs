@@ -33,12 +33,12 @@ pub struct Trip {
 }
 
 impl Trip {
-    /// Its rows in the recording.
+    /// Returns its rows in the recording.
     pub fn rows(&self) -> std::ops::Range<usize> {
         self.along.first_row..self.along.first_row + self.along.chainage_m.len()
     }
 
-    /// Length in m.
+    /// Returns the length in m.
     pub fn length_m(&self) -> f64 {
         let along = &self.along.chainage_m;
         along.last().copied().unwrap_or(0.0) - along.first().copied().unwrap_or(0.0)

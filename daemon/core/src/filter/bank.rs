@@ -36,31 +36,31 @@ impl<H, const MAX: usize> Bank<H, MAX> {
         Bank { hypotheses, weights, likeliest: 0 }
     }
 
-    /// The hypotheses.
+    /// Returns the hypotheses.
     #[inline]
     pub fn hypotheses(&self) -> &[H] {
         &self.hypotheses
     }
 
-    /// The same, to be moved.
+    /// Returns the same, to be moved.
     #[inline]
     pub fn hypotheses_mut(&mut self) -> &mut [H] {
         &mut self.hypotheses
     }
 
-    /// The evidence for each.
+    /// Returns the evidence for each.
     #[inline]
     pub fn weights(&self) -> &[f64] {
         &self.weights[..self.hypotheses.len()]
     }
 
-    /// The hypotheses and their evidence, to be measured and weighed.
+    /// Returns the hypotheses and their evidence, to be measured and weighed.
     #[inline]
     pub fn weighed_mut(&mut self) -> impl Iterator<Item = (&mut H, &mut f64)> {
         self.hypotheses.iter_mut().zip(&mut self.weights)
     }
 
-    /// The hypothesis with the most evidence when the bank settled last.
+    /// Returns the hypothesis with the most evidence when the bank settled last.
     ///
     /// # Panics
     ///
@@ -70,7 +70,7 @@ impl<H, const MAX: usize> Bank<H, MAX> {
         &self.hypotheses[self.likeliest]
     }
 
-    /// Its place.
+    /// Returns its place.
     #[inline]
     pub fn likeliest_index(&self) -> usize {
         self.likeliest
@@ -103,7 +103,7 @@ impl<H, const MAX: usize> Bank<H, MAX> {
         self.weights.iter_mut().for_each(|weight| *weight /= greatest);
     }
 
-    /// Probability of each hypothesis that counts, by its logarithm; 0 of the others.
+    /// Returns the probability of each hypothesis that counts, by its logarithm; 0 of the others.
     #[inline]
     pub fn shares(&self, counts: impl Fn(&H) -> bool) -> [f64; MAX] {
         let mut shares = [0.0; MAX];

@@ -44,7 +44,7 @@ pub fn bounded_minimum<const N: usize>(
     Err(NotPositiveDefinite)
 }
 
-/// The minimum with the parameters of `active` held at their bounds.
+/// Returns the minimum with the parameters of `active` held at their bounds.
 fn minimum_with<const N: usize>(
     information: &SMatrix<f64, N, N>,
     free: &SVector<f64, N>,

@@ -183,7 +183,7 @@ impl<const N: usize> DriftingLevel<N> {
         Some(solution)
     }
 
-    /// Square root S of the covariance S Sᵀ of bias and parameters.
+    /// Returns the square root S of the covariance S Sᵀ of bias and parameters.
     ///
     /// Row and column [`LEVEL`] are 0. `None` as for [`DriftingLevel::solve`].
     pub fn covariance_root(&self) -> Option<SMatrix<f64, N, N>> {

@@ -40,7 +40,7 @@ pub struct FixedLagSmoother<const N: usize, T> {
 }
 
 impl<const N: usize, T: Copy> FixedLagSmoother<N, T> {
-    /// A smoother that remembers `capacity` moments, at least one.
+    /// Returns a smoother that remembers `capacity` moments, at least one.
     pub fn new(capacity: usize) -> Self {
         let capacity = capacity.max(1);
         FixedLagSmoother { moments: Vec::with_capacity(capacity), capacity, oldest: 0 }
@@ -95,12 +95,12 @@ impl<const N: usize, T: Copy> FixedLagSmoother<N, T> {
         }
     }
 
-    /// The oldest remembered moment.
+    /// Returns the oldest remembered moment.
     pub fn oldest(&self) -> Option<&Lagged<N, T>> {
         self.moments.get(self.oldest)
     }
 
-    /// The remembered moments, the latest first.
+    /// Returns the remembered moments, the latest first.
     pub fn newest_first(&self) -> impl Iterator<Item = &Lagged<N, T>> {
         let (before, from) = self.moments.split_at(self.oldest);
         before.iter().rev().chain(from.iter().rev())
@@ -123,7 +123,7 @@ pub struct ForwardStep<const N: usize> {
 }
 
 impl<const N: usize> ForwardStep<N> {
-    /// How far the measurement moved the state, for an innovation of 1.
+    /// Returns how far the measurement moved the state, for an innovation of 1.
     #[inline]
     pub fn gain(&self) -> SVector<f64, N> {
         self.predicted.covariance.column(self.component) * self.innovation.inverse_variance
@@ -162,7 +162,7 @@ mod tests {
 
     const SECOND: usize = 1;
 
-    /// The smoother's moments after a forward pass over 40 steps, and the last state.
+    /// Returns the smoother's moments after a forward pass over 40 steps, and the last state.
     fn run(capacity: usize) -> (Gaussian<2>, FixedLagSmoother<2, usize>) {
         let mut smoother = FixedLagSmoother::new(capacity);
         let mut number = 0;

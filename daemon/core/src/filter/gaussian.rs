@@ -42,7 +42,7 @@ impl Innovation {
         }
     }
 
-    /// Its square over its predicted variance.
+    /// Returns its square over its predicted variance.
     pub fn normalised_square(&self) -> f64 {
         self.value * self.value * self.inverse_variance
     }
@@ -52,7 +52,7 @@ impl Innovation {
         self.value * self.inverse_variance.sqrt()
     }
 
-    /// Logarithm of the predicted density of the measured value.
+    /// Returns the logarithm of the predicted density of the measured value.
     pub fn log_likelihood(&self) -> f64 {
         -0.5 * (self.normalised_square() + (std::f64::consts::TAU * self.variance).ln())
     }
@@ -69,7 +69,7 @@ pub struct Gaussian<const N: usize> {
 
 /// Component `i` must be below N everywhere here.
 impl<const N: usize> Gaussian<N> {
-    /// A belief with independent components of the given standard deviations.
+    /// Returns a belief with independent components of the given standard deviations.
     pub fn independent(mean: SVector<f64, N>, std: SVector<f64, N>) -> Self {
         let variances = std.component_mul(&std);
         Gaussian { mean, covariance: SMatrix::from_diagonal(&variances) }
@@ -204,12 +204,12 @@ impl<const N: usize> Gaussian<N> {
         Ok(innovation)
     }
 
-    /// Standard deviation of component `i`.
+    /// Returns the standard deviation of component `i`.
     pub fn std(&self, i: usize) -> f64 {
         self.covariance[(i, i)].max(0.0).sqrt()
     }
 
-    /// True while every number is finite and every variance positive; measuring keeps the rest of
+    /// Returns whether every number is finite and every variance positive; measuring keeps the rest of
     /// positive definiteness.
     pub fn is_sound(&self) -> bool {
         // One infinity or NaN makes the sum one.

@@ -67,7 +67,7 @@ impl<const N: usize> SquareRootInformation<N> {
         self.count *= factor;
     }
 
-    /// The minimiser of the weighted sum of squares.
+    /// Returns the minimiser of the weighted sum of squares.
     ///
     /// # Errors
     ///
@@ -76,7 +76,7 @@ impl<const N: usize> SquareRootInformation<N> {
         self.system.minimiser().ok_or(NotPositiveDefinite)
     }
 
-    /// Covariance of the solution for errors of unit variance.
+    /// Returns the covariance of the solution for errors of unit variance.
     ///
     /// # Errors
     ///
@@ -91,17 +91,17 @@ impl<const N: usize> SquareRootInformation<N> {
         self.system.factor.tr_mul(&self.system.factor)
     }
 
-    /// Logarithm of the information matrix's determinant; negative infinity while singular.
+    /// Returns the logarithm of the information matrix's determinant; negative infinity while singular.
     pub fn log_determinant(&self) -> f64 {
         2.0 * (0..N).map(|i| self.system.factor[(i, i)].abs().ln()).sum::<f64>()
     }
 
-    /// Sum of squared residuals of the solution, penalty included.
+    /// Returns the sum of squared residuals of the solution, penalty included.
     pub fn residual_sum(&self) -> f64 {
         self.residual_sum
     }
 
-    /// Number of rows seen, the forgotten ones in part.
+    /// Returns the number of rows seen, the forgotten ones in part.
     pub fn count(&self) -> f64 {
         self.count
     }

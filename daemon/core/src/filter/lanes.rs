@@ -1,6 +1,6 @@
 //! Sums and powers over slices that the compiler turns into vector instructions.
 
-/// Sum of products; summed in four lanes, so that the additions do not wait for each other.
+/// Returns the sum of products; summed in four lanes, so that the additions do not wait for each other.
 #[inline]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (a_lanes, b_lanes) = (a.chunks_exact(4), b.chunks_exact(4));
@@ -15,7 +15,7 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
 }
 
-/// Sum of a slice, in four lanes.
+/// Returns the sum of a slice, in four lanes.
 pub fn sum(a: &[f64]) -> f64 {
     let lanes = a.chunks_exact(4);
     let rest: f64 = lanes.remainder().iter().sum();

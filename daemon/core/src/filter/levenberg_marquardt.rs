@@ -11,7 +11,7 @@ use super::triangular::TriangularSystem;
 
 /// A sum of squared residuals over `N` parameters.
 pub trait LeastSquares<const N: usize> {
-    /// Cost and linear model at a point; `None` where the residuals are not defined.
+    /// Returns the cost and linear model at a point; `None` where the residuals are not defined.
     fn linearise(&mut self, point: &SVector<f64, N>) -> Option<Linearisation<N>>;
 
     /// Called after the newest linearised point has become the current one.
@@ -41,12 +41,12 @@ pub struct ParameterBox<const N: usize> {
 }
 
 impl<const N: usize> ParameterBox<N> {
-    /// The point of the box nearest to a point.
+    /// Returns the point of the box nearest to a point.
     pub fn clamp(&self, point: &SVector<f64, N>) -> SVector<f64, N> {
         SVector::from_fn(|i, _| point[i].max(self.low[i]).min(self.high[i]))
     }
 
-    /// True for a point in the box or on its faces.
+    /// Returns true for a point in the box or on its faces.
     pub fn contains(&self, point: &SVector<f64, N>) -> bool {
         (0..N).all(|i| (self.low[i]..=self.high[i]).contains(&point[i]))
     }
@@ -146,7 +146,7 @@ pub fn minimise<const N: usize>(
     Some(LeastSquaresSolution { point, linearisation: current, iterations, stop })
 }
 
-/// The minimiser of the damped model within the box, and the decrease of the undamped model.
+/// Returns the minimiser of the damped model within the box, and the decrease of the undamped model.
 fn bounded_step<const N: usize>(
     system: &TriangularSystem<N>,
     point: &SVector<f64, N>,

@@ -39,12 +39,12 @@ impl<const L: usize> RunningMedian<L> {
         self.count += 1;
     }
 
-    /// The number of values held, at most L.
+    /// Returns the number of values held, at most L.
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// The median of the values held; `None` before the first.
+    /// Returns the median of the values held; `None` before the first.
     pub fn median(&self) -> Option<f64> {
         match self.count {
             0 => None,

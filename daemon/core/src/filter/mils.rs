@@ -22,7 +22,7 @@ impl<const N: usize> Penalty<N> {
         Penalty { lambda: SVector::zeros(), length: 1, is_printed: false }
     }
 
-    /// Weight that update number `index`, counted from 0, adds to each square.
+    /// Returns the weight that update number `index`, counted from 0, adds to each square.
     fn weights_at(&self, index: u64) -> Option<SVector<f64, N>> {
         let length = f64::from(self.length.max(1));
         match self.is_printed {
@@ -73,12 +73,12 @@ impl<const N: usize, const L: usize> Mils<N, L> {
         }
     }
 
-    /// The estimate.
+    /// Returns the estimate.
     pub fn estimate(&self) -> &SVector<f64, N> {
         &self.belief.mean
     }
 
-    /// The estimate's covariance in units of the error's variance: p P.
+    /// Returns the estimate's covariance in units of the error's variance: p P.
     ///
     /// Exact without regularisation, since every row entered p times. With it, it is the
     /// posterior covariance for a prior of weight lambda/p, which is what the repetition makes
@@ -169,7 +169,7 @@ impl<const N: usize, const L: usize> Mils<N, L> {
 /// their digits. After a first penalty it is at most the number of parameters.
 const WEIGHTED_SUM_MAX: f64 = 100.0;
 
-/// A belief after rows that observe each parameter as 0 with a weight: A times its mean and A P, with
+/// Returns a belief after rows that observe each parameter as 0 with a weight: A times its mean and A P, with
 /// A = (I + P W)⁻¹ (Liu 2018, eq. 14, without dividing by lambda).
 #[inline(always)]
 fn drawn_to_zero<const N: usize>(
@@ -193,7 +193,7 @@ fn drawn_to_zero<const N: usize>(
     Ok(Gaussian { mean: share * mean, covariance })
 }
 
-/// The same for any covariance, away from the usual way and by value, so that there the belief
+/// Returns the same for any covariance, away from the usual way and by value, so that there the belief
 /// stays in registers.
 #[cold]
 #[inline(never)]
@@ -224,7 +224,7 @@ mod tests {
             .collect()
     }
 
-    /// The formulas as Liu 2018 prints them: Q by eq. 14, then the stacked update.
+    /// Returns the formulas as Liu 2018 prints them: Q by eq. 14, then the stacked update.
     fn printed(rows: &[(Vector3<f64>, f64)], p: usize, lambda_per_n: f64, p0: f64) -> Vector3<f64> {
         let mut theta = Vector3::repeat(1.0 / p0);
         let mut covariance = Matrix3::identity() * p0;

@@ -11,7 +11,7 @@
 //! - `rls`, `mils`, `bounded`: least squares, recursive, with bounds
 //! - `whitening`, `line`, `median`: from raw rows to independent, clean ones
 //! - [`levenberg_marquardt`]: small nonlinear least squares in a box
-//! - [`fixed_lag`]: what later measurements say of an earlier state, without a backward pass or by one
+//! - [`fixed_lag`]: estimates of an earlier state by later measurements, without a backward pass or by one
 //!   without an inverse (Bryson and Frazier)
 //! - [`particle`], [`random`]: particle filter, marginal particle smoother and their seeded generator
 //! - [`bank`]: hypotheses side by side, weighed by evidence, and beliefs mixed by weight

@@ -7,7 +7,7 @@ pub struct Random {
     ziggurat: Ziggurat,
 }
 
-/// The next number of the generator SplitMix64, whose state is a counter.
+/// Returns the next number of the generator SplitMix64, whose state is a counter.
 pub fn split_mix(counter: &mut u64) -> u64 {
     *counter = counter.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let mut mixed = *counter;
@@ -17,7 +17,7 @@ pub fn split_mix(counter: &mut u64) -> u64 {
 }
 
 impl Random {
-    /// A generator for a seed; equal seeds give equal sequences.
+    /// Returns a generator for a seed; equal seeds give equal sequences.
     pub fn new(seed: u64) -> Self {
         let mut counter = seed;
         let state = std::array::from_fn(|_| split_mix(&mut counter));
@@ -44,7 +44,7 @@ impl Random {
         (self.next() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
     }
 
-    /// A standard normal number, by the ziggurat of Marsaglia and Tsang in Doornik's form (2005).
+    /// Returns a standard normal number, by the ziggurat of Marsaglia and Tsang in Doornik's form (2005).
     #[inline]
     pub fn normal(&mut self) -> f64 {
         let (layer, place) = self.layer_and_place();
@@ -55,14 +55,14 @@ impl Random {
         }
     }
 
-    /// A layer and where in it, from -1 to 1; from different bits of one number.
+    /// Returns a layer and where in it, from -1 to 1; from different bits of one number.
     #[inline]
     fn layer_and_place(&mut self) -> (usize, f64) {
         let bits = self.next();
         ((bits & 0x7f) as usize, (bits >> 11) as f64 * (2.0 / (1u64 << 53) as f64) - 1.0)
     }
 
-    /// The normal number of a place that does not lie wholly inside its layer: about one in 80.
+    /// Returns the normal number of a place that does not lie wholly inside its layer: about one in 80.
     #[cold]
     #[inline(never)]
     fn normal_at_edge(&mut self, mut layer: usize, mut place: f64) -> f64 {
@@ -84,7 +84,7 @@ impl Random {
         }
     }
 
-    /// A number beyond the last edge.
+    /// Returns a number beyond the last edge.
     fn tail(&mut self, is_negative: bool) -> f64 {
         loop {
             // 1 - u keeps the logarithm finite.

@@ -111,7 +111,7 @@ mod tests {
             .collect()
     }
 
-    /// The batch twin: the same prior and weights, by orthogonal rotations.
+    /// Returns the batch twin: the same prior and weights, by orthogonal rotations.
     fn twin(
         rows: &[(Vector3<f64>, f64)],
         variance: f64,

@@ -15,7 +15,7 @@ impl<const N: usize> CovarianceFactor<N> {
         CovarianceFactor(SMatrix::from_diagonal(deviations))
     }
 
-    /// The factor of a covariance; `None` when it is not positive definite.
+    /// Returns the factor of a covariance; `None` when it is not positive definite.
     pub fn of(covariance: &SMatrix<f64, N, N>) -> Option<Self> {
         Some(CovarianceFactor(covariance.cholesky()?.unpack()))
     }
@@ -37,7 +37,7 @@ impl<const N: usize> CovarianceFactor<N> {
         self.measure_along(&along, noise_variance)
     }
 
-    /// The update for w = Lᵀ h.
+    /// Returns the update for w = Lᵀ h.
     ///
     /// Only sums of positive terms are formed: with S_k = r + Σ_{j>=k} w_j², the factor of
     /// I - w wᵀ / S_1 has the diagonal √(S_{k+1} / S_k) and, below it, -w_j w_k / √(S_k S_{k+1}).
@@ -65,7 +65,7 @@ impl<const N: usize> CovarianceFactor<N> {
         carried * (1.0 / sum)
     }
 
-    /// True while every entry is a number and no variance is zero.
+    /// Returns whether every entry is a number and no variance is zero.
     #[inline]
     pub fn is_sound(&self) -> bool {
         // One infinity or NaN makes the sum one.

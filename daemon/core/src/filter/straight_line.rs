@@ -24,7 +24,7 @@ impl FittedLine {
         self.xx += x * x;
     }
 
-    /// The line through the points of both, which must share their origin.
+    /// Returns the line through the points of both, which must share their origin.
     pub fn joined(&self, other: &FittedLine) -> FittedLine {
         FittedLine {
             count: self.count + other.count,
@@ -36,28 +36,28 @@ impl FittedLine {
         }
     }
 
-    /// The number of points.
+    /// Returns the number of points.
     pub fn count(&self) -> f64 {
         self.count
     }
 
-    /// The mean of x; 0 without points.
+    /// Returns the mean of x; 0 without points.
     pub fn mean(&self) -> f64 {
         if self.count > 0.0 { self.x / self.count } else { 0.0 }
     }
 
-    /// The sum of squares of t about its mean: the slope's variance is the points' over this.
+    /// Returns the sum of squares of t about its mean: the slope's variance is the points' over this.
     pub fn spread(&self) -> f64 {
         if self.count > 0.0 { (self.tt - self.t * self.t / self.count).max(0.0) } else { 0.0 }
     }
 
-    /// The slope; `None` while all points have the same t.
+    /// Returns the slope; `None` while all points have the same t.
     pub fn slope(&self) -> Option<f64> {
         let spread = self.spread();
         (spread > 0.0).then(|| (self.tx - self.t * self.mean()) / spread)
     }
 
-    /// The sum of squares of x about the line, with count - 2 degrees of freedom.
+    /// Returns the sum of squares of x about the line, with count - 2 degrees of freedom.
     pub fn scatter(&self) -> f64 {
         let about_mean = self.xx - self.count * self.mean() * self.mean();
         let explained = self.slope().map_or(0.0, |slope| slope * slope * self.spread());

@@ -51,7 +51,7 @@ impl MovingState {
         forward
     }
 
-    /// All states at once, from the normal equations of prior, moves and measurements: means and
+    /// Returns all states at once, from the normal equations of prior, moves and measurements: means and
     /// covariances by step.
     pub fn batch(&self) -> (Vec<Vector2<f64>>, Vec<Matrix2<f64>>) {
         let steps = self.measured.len();

@@ -74,7 +74,7 @@ impl<const C: usize> TriangularAccumulator<C> {
         self.rows = 0;
     }
 
-    /// The triangular factor, row by row; entries below the diagonal are zero.
+    /// Returns the triangular factor, row by row; entries below the diagonal are zero.
     pub fn factor(&mut self) -> &[[f64; C]; C] {
         if self.rows > 0 {
             self.flush();
@@ -93,7 +93,7 @@ pub struct TriangularSystem<const N: usize> {
 }
 
 impl<const N: usize> TriangularSystem<N> {
-    /// The last `N` columns before the residual of gathered rows of `C` columns, with the
+    /// Returns the last `N` columns before the residual of gathered rows of `C` columns, with the
     /// columns before them eliminated.
     ///
     /// # Panics
@@ -137,18 +137,18 @@ impl<const N: usize> TriangularSystem<N> {
         residual
     }
 
-    /// The minimiser; `None` when the rows do not determine it.
+    /// Returns the minimiser; `None` when the rows do not determine it.
     pub fn minimiser(&self) -> Option<SVector<f64, N>> {
         let solution = self.factor.solve_upper_triangular(&-self.residual)?;
         solution.iter().all(|entry| entry.is_finite()).then_some(solution)
     }
 
-    /// Gradient Rᵀ z of half the squared norm at x = 0.
+    /// Returns the gradient Rᵀ z of half the squared norm at x = 0.
     pub fn gradient(&self) -> SVector<f64, N> {
         self.factor.tr_mul(&self.residual)
     }
 
-    /// Covariance (Rᵀ R)⁻¹ of the minimiser for residuals of unit variance; `None` when the
+    /// Returns the covariance (Rᵀ R)⁻¹ of the minimiser for residuals of unit variance; `None` when the
     /// rows do not determine it.
     pub fn covariance(&self) -> Option<SMatrix<f64, N, N>> {
         let inverse = self.inverse();

@@ -1,14 +1,10 @@
-//! The interface of every estimator, writing an estimate into a snapshot, and an estimator that estimates nothing.
+//! The interface of every estimator, and one that estimates nothing.
 
 use dynocar_model::force::ResolvedSample;
-use dynocar_shared::snapshot::{PARAMETERS_MAX, packed_index};
-use dynocar_shared::{
-    Manoeuvre, Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status,
-};
-use nalgebra::{SMatrix, SVector};
+use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
 
+use super::KeptEstimate;
 use super::judge::{InputState, Judgement};
-use super::{InnovationMonitor, KeptEstimate};
 
 /// Result of an estimator's update with a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,10 +24,10 @@ pub enum Outcome {
 /// An implementation allocates only while it is built; time comes in with the samples, and any
 /// randomness from a seed in its settings.
 pub trait Estimator: Send {
-    /// The kind of estimator, for the snapshot.
+    /// Returns the kind of estimator, for the snapshot.
     fn kind(&self) -> PipelineKind;
 
-    /// True when samples pass the gate for forces that stand alone before they are taken into account.
+    /// Returns whether samples pass the gate for forces that stand alone before they are taken into account.
     fn is_gated(&self) -> bool {
         false
     }
@@ -85,62 +81,4 @@ impl Estimator for Echo {
     fn write(&self, _input: &InputState, _snapshot: &mut ParameterSnapshot) -> Judgement {
         (Status::Unestimated, Reason::None).into()
     }
-}
-
-/// A parameter's unit in the contract over the one that estimators compute in: a snapshot has the
-/// mass in t, everything here has it in kg.
-pub fn contract_unit(parameter: Parameter) -> f64 {
-    if parameter == Parameter::Mass { 1e-3 } else { 1.0 }
-}
-
-/// Writes parameters with values and full covariance, the mass in kg.
-///
-/// # Panics
-///
-/// At compile time when there are more parameters than a snapshot holds.
-pub fn write_parameters<const N: usize>(
-    snapshot: &mut ParameterSnapshot,
-    parameters: [Parameter; N],
-    values: &SVector<f64, N>,
-    covariance: &SMatrix<f64, N, N>,
-) {
-    const { assert!(N <= PARAMETERS_MAX) };
-    snapshot.parameter_count = N as u32;
-    let units = parameters.map(contract_unit);
-    for i in 0..N {
-        snapshot.parameters[i] = parameters[i] as u32;
-        snapshot.values[i] = units[i] * values[i];
-        for j in 0..=i {
-            snapshot.covariance[packed_index(i, j)] = units[i] * units[j] * covariance[(i, j)];
-        }
-    }
-}
-
-/// Writes the innovation statistics.
-pub fn write_innovations(snapshot: &mut ParameterSnapshot, monitor: &InnovationMonitor) {
-    snapshot.innovation_normalised = monitor.last();
-    snapshot.innovation_mean_square = monitor.mean_square();
-    snapshot.innovation_correlation = monitor.correlation();
-}
-
-/// The Davis coefficients, in their order.
-pub const DAVIS: [Parameter; 3] = [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC];
-/// The Davis coefficients and the mass, in their order.
-pub const DAVIS_AND_MASS: [Parameter; 4] =
-    [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC, Parameter::Mass];
-/// Manoeuvre that brings data for each of them.
-const MANOEUVRES: [Manoeuvre; 4] =
-    [Manoeuvre::CoastSlow, Manoeuvre::VarySpeed, Manoeuvre::CoastFast, Manoeuvre::Accelerate];
-
-/// Bits of those of [`DAVIS_AND_MASS`] that the data determine, and of the manoeuvres that bring data
-/// for the others.
-pub fn excitation<const N: usize>(is_known: [bool; N]) -> (u32, u32) {
-    let mut bits = (0, 0);
-    for (i, (is_known, manoeuvre)) in is_known.into_iter().zip(MANOEUVRES).enumerate() {
-        match is_known {
-            true => bits.0 |= 1 << i,
-            false => bits.1 |= manoeuvre.bit(),
-        }
-    }
-    bits
 }

@@ -7,8 +7,8 @@ use dynocar_shared::snapshot::{PARAMETERS_MAX, packed_index};
 use dynocar_shared::{Parameter, ParameterSnapshot, Status};
 use nalgebra::{Cholesky, DMatrix, SMatrix, SVector};
 
-use super::estimator::contract_unit;
 use super::judge::{are_alike, are_too_large};
+use super::output::contract_unit;
 
 /// A validated estimate with its covariance.
 #[derive(Clone, Debug, PartialEq)]
@@ -154,17 +154,17 @@ impl KeptEstimate {
         Some(self.first_covariance[packed_index(index, index)])
     }
 
-    /// The parameters.
+    /// Returns the parameters.
     pub fn parameters(&self) -> &[Parameter] {
         &self.parameters
     }
 
-    /// Their values, each in its unit.
+    /// Returns their values, each in its unit.
     pub fn values(&self) -> &[f64] {
         &self.values
     }
 
-    /// Their covariance, lower triangle packed by rows.
+    /// Returns their covariance, lower triangle packed by rows.
     pub fn covariance(&self) -> &[f64] {
         &self.covariance
     }
@@ -211,7 +211,7 @@ impl KeptEstimate {
     }
 }
 
-/// How far a parameter wanders in the long run, as a share of its value, and the time in s of it.
+/// Returns how far a parameter wanders in the long run, as a share of its value, and the time in s of it.
 fn wander(parameter: Parameter) -> (f64, f64) {
     match parameter {
         Parameter::Mass => (0.15, 120.0),

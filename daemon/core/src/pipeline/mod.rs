@@ -5,12 +5,13 @@
 
 pub mod admission;
 pub mod braking;
-pub mod estimator;
+mod estimator;
 pub mod judge;
 mod kept;
 pub mod momentum;
 pub mod monitor;
 pub mod motion;
+pub mod output;
 pub mod quantities;
 pub mod settings;
 pub mod train_kalman;
@@ -46,7 +47,7 @@ pub struct Pipeline {
 }
 
 impl Pipeline {
-    /// A pipeline around an estimator; `index` is its number in the configuration.
+    /// Returns a pipeline around an estimator; `index` is its number in the configuration.
     pub fn new(
         train_id: TrainId,
         index: u32,
@@ -167,12 +168,12 @@ impl Pipeline {
         self.admission.implausible(self.estimator.kind())
     }
 
-    /// The snapshot after the last sample.
+    /// Returns the snapshot after the last sample.
     pub fn snapshot(&self) -> &ParameterSnapshot {
         &self.snapshot
     }
 
-    /// The snapshot after the last sample, for its publisher to stamp.
+    /// Returns the snapshot after the last sample, for its publisher to stamp.
     pub fn snapshot_mut(&mut self) -> &mut ParameterSnapshot {
         &mut self.snapshot
     }

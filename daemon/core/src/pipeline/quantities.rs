@@ -1,8 +1,8 @@
-//! Which estimators answer a controller's question for a quantity, the best measured first.
+//! The estimators that answer a controller's question for a quantity, the best measured first.
 
 use dynocar_shared::{PipelineKind, Quantity};
 
-/// The kinds that can answer a quantity, the best measured first: the first of them that a train's
+/// Returns the kinds that can answer a quantity, the best measured first: the first of them that a train's
 /// configuration has is the one that answers unless the configuration names another.
 ///
 /// The order is that of `docs/scenarios.md`, then of the errors in `docs/papers.md` and of the misled

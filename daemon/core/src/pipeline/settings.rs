@@ -28,7 +28,7 @@ pub fn require(
 
 /// A setting that has a range.
 pub trait Ranged: Copy {
-    /// Its value; `None` while it is absent, which any range allows.
+    /// Returns its value; `None` while it is absent, which any range allows.
     fn value(self) -> Option<f64>;
 }
 

@@ -1,4 +1,4 @@
-//! From figures to input faults: which one would make all of them come out as they did.
+//! Diagnosis of an input fault: the fault that explains all figures.
 //!
 //! | fault by a factor f of reported over true | forces' factor | distance by position / by speed | gradient's factor |
 //! | --- | --- | --- | --- |
@@ -93,7 +93,7 @@ fn is_outside(value: f64, (low, high): (f64, f64)) -> bool {
     !(low..=high).contains(&value)
 }
 
-/// The input fault that explains how position and speed go together.
+/// Returns the input fault that explains how position and speed go together.
 fn kinematic(figures: &Figures) -> Option<DetectedFault> {
     let ratio = figures.distance_ratio?;
     if (-DISTANCE_RATIOS.1..-DISTANCE_RATIOS.0).contains(&ratio) {
@@ -128,7 +128,7 @@ fn kinematic(figures: &Figures) -> Option<DetectedFault> {
     known.min_by(|one, other| one.0.total_cmp(&other.0)).map(|(_, fault)| fault)
 }
 
-/// The factor of both forces, when they have one.
+/// Returns the factor of both forces, when they have one.
 fn common_factor(figures: &Figures) -> Option<f64> {
     match (figures.slopes.traction, figures.slopes.brake) {
         (Some(one), Some(other)) => {
@@ -164,7 +164,7 @@ fn of_forces(figures: &Figures, by: f64, is_kinematic: bool, found: &mut Detecte
     }
 }
 
-/// Who is to blame when both forces miss the acceleration by a factor: the speed where its units
+/// Returns who is to blame when both forces miss the acceleration by a factor: the speed where its units
 /// explain it and no position contradicts, the mass where the forces are such as the effort curves
 /// allow and would not be otherwise, else the forces.
 fn blamed(figures: &Figures, common: f64, is_kinematic: bool) -> (InputFault, f64) {
@@ -214,7 +214,7 @@ pub fn gradient_fault(all: &WindowBalance) -> Option<DetectedFault> {
     is_scale.then_some(DetectedFault { fault: InputFault::GradientScale, factor: 1.0 / factor })
 }
 
-/// The factor of units that brings a pressure next to an ordinary one.
+/// Returns the factor of units that brings a pressure next to an ordinary one.
 fn pressure_factor(pressure_pa: f64) -> f64 {
     let distance = |factor: &f64| (pressure_pa / factor / ORDINARY_PRESSURE_PA).ln().abs();
     let factors = [1e-5, 1e-3, 1e-2];

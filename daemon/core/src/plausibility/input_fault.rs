@@ -56,12 +56,12 @@ named! {
 }
 
 impl InputFault {
-    /// The member with this number.
+    /// Returns the member with this number.
     pub fn from_number(number: u8) -> Option<Self> {
         Self::ALL.into_iter().find(|fault| *fault as u8 == number)
     }
 
-    /// How much it matters: the pressure enters no balance of forces.
+    /// Returns how much it matters: the pressure enters no balance of forces.
     pub const fn severity(self) -> Severity {
         match self {
             InputFault::PressureScale => Severity::Warning,
@@ -69,7 +69,7 @@ impl InputFault {
         }
     }
 
-    /// Why a pipeline that is fed with it is not to be trusted.
+    /// Returns why a pipeline that is fed with it is not to be trusted.
     pub const fn reason(self) -> Reason {
         match self {
             InputFault::TimeScale
@@ -86,7 +86,7 @@ impl InputFault {
         }
     }
 
-    /// True when it spoils what a kind of pipeline estimates: only brakes are judged by pressure.
+    /// Returns whether it spoils what a kind of pipeline estimates: only brakes are judged by pressure.
     pub const fn concerns(self, kind: PipelineKind) -> bool {
         use PipelineKind::*;
         match self {
@@ -121,7 +121,7 @@ impl InputFault {
         }
     }
 
-    /// How well two units of the quantity explain a factor of reported over true: the logarithm of
+    /// Returns how well two units of the quantity explain a factor of reported over true: the logarithm of
     /// what is left, for the nearest two; `None` where none is near.
     pub fn misfit(self, factor: f64) -> Option<f64> {
         let pairs = Unit::usual_of(self.dimension()).flat_map(|of| {
@@ -145,7 +145,7 @@ pub struct DetectedFault {
 }
 
 impl DetectedFault {
-    /// The unit that the values are in, when they were read as another and that explains the
+    /// Returns the unit that the values are in, when they were read as another and that explains the
     /// factor.
     pub fn true_unit(&self, read_as: &Unit) -> Option<Unit> {
         let misfit = |of: &Unit| (self.factor / read_as.in_terms_of(of)).abs().ln().abs();
@@ -156,12 +156,12 @@ impl DetectedFault {
 }
 
 impl DetectedFault {
-    /// The detected fault in words; `read_as` is the unit that the quantity was read in.
+    /// Returns the detected fault in words; `read_as` is the unit that the quantity was read in.
     pub fn words(&self, read_as: &Unit) -> String {
         self.words_for((self.factor, self.factor), read_as)
     }
 
-    /// The same for factors of several runs, from the lowest to the highest.
+    /// Returns the same for factors of several runs, from the lowest to the highest.
     pub fn words_for(&self, (low, high): (f64, f64), read_as: &Unit) -> String {
         let size = size(low, high);
         let what = match self.fault {

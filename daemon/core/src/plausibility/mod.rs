@@ -1,4 +1,4 @@
-//! Whether samples can be true: wrong units, swapped forces, reversed signs.
+//! Plausibility of samples: wrong units, swapped forces, reversed signs.
 //!
 //! The same laws judge a train's samples live and recorded runs, both by
 //! [`Admission`](crate::pipeline::admission::Admission).

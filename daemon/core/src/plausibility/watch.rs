@@ -1,4 +1,4 @@
-//! Sample by sample: from a stream of samples to what they say of units, signs and swaps.
+//! Evidence on units, signs and swaps, gathered sample by sample.
 
 use std::sync::Arc;
 
@@ -89,7 +89,7 @@ pub struct PlausibilityWatch {
 }
 
 impl PlausibilityWatch {
-    /// A watch over the samples of a train as it is declared.
+    /// Returns a watch over the samples of a train as it is declared.
     pub fn new(train: Arc<TrainModel>) -> Self {
         PlausibilityWatch {
             train,
@@ -257,7 +257,7 @@ impl PlausibilityWatch {
     }
 }
 
-/// Traction and brake force in N. One that is not recorded is 0 while the other acts.
+/// Returns the traction and brake force in N. One that is not recorded is 0 while the other acts.
 fn forces_n(sample: &TrainSample) -> Option<(f64, f64)> {
     match (sample.get(SampleField::TractionForce), sample.get(SampleField::BrakeForce)) {
         (Some(traction), Some(brake)) => Some((traction, brake)),
@@ -310,7 +310,7 @@ impl PressureContrast {
         mean.take(pressure.abs(), step_s);
     }
 
-    /// The mean pressure in Pa while braking, when it surely follows the brake.
+    /// Returns the mean pressure in Pa while braking, when it surely follows the brake.
     pub fn braking_pa(&self) -> Option<f64> {
         let is_enough = self.braking.time_s.min(self.released.time_s) >= BRAKING_MIN_S;
         let follows = is_enough && self.braking.value() > CONTRAST_MIN * self.released.value();

@@ -62,7 +62,7 @@ pub struct FittedFactor {
 }
 
 impl FittedFactor {
-    /// True when the motion determines the factor, at least this number of standard deviations away from 0.
+    /// Returns whether the motion determines the factor, at least this number of standard deviations away from 0.
     pub fn is_known(&self, deviations: f64) -> bool {
         self.own_share > OWN_SHARE_MIN && self.factor.abs() > deviations * self.std
     }
@@ -121,12 +121,12 @@ impl WindowBalance {
         self.windows = self.windows * keep + 1.0;
     }
 
-    /// Root mean square of the gradients in ‰.
+    /// Returns the root mean square of the gradients in ‰.
     pub fn gradient_rms_permille(&self) -> f64 {
         1e3 / STANDARD_GRAVITY_MPS2 * (self.gram[(2, 2)] / self.windows.max(1.0)).sqrt()
     }
 
-    /// The factors by least squares, as far as the motion determines them.
+    /// Returns the factors by least squares, as far as the motion determines them.
     pub fn slopes(&self) -> Slopes {
         let slope =
             |fitted: FittedFactor| fitted.is_known(KNOWN_DEVIATIONS).then_some(fitted.factor);
@@ -134,7 +134,7 @@ impl WindowBalance {
         Slopes { traction: slope(traction), brake: slope(brake), gradient: slope(gradient) }
     }
 
-    /// The factors of traction, brake and gradient by least squares; `None` for too few windows.
+    /// Returns the factors of traction, brake and gradient by least squares; `None` for too few windows.
     pub fn fit(&self) -> Option<[FittedFactor; 3]> {
         if self.windows < WINDOWS_MIN {
             return None;
@@ -172,7 +172,7 @@ impl WindowBalance {
         self.windows += other.windows;
     }
 
-    /// Windows in the sums.
+    /// Returns the windows in the sums.
     pub fn windows(&self) -> f64 {
         self.windows
     }

@@ -1,4 +1,4 @@
-//! How sure one may be that one model predicts better than another, whenever one looks.
+//! Evidence that one model predicts better than another, valid at every look.
 //!
 //! Each trip gives a score between -1 and 1: (e0² - e1²) / (e0² + e1²) with the open-loop errors
 //! of the model in force, e0, and of its rival, e1. The hypothesis to be refuted is that the rival
@@ -26,19 +26,19 @@ const WEIGHT_MAX: f64 = 0.5;
 /// A greater ratio of two errors says no more than that nothing bounds it.
 pub const RATIO_MAX: f64 = 100.0;
 
-/// The score of a trip: 1 when the rival leaves nothing of the error, -1 when the model in force
+/// Returns the score of a trip: 1 when the rival leaves nothing of the error, -1 when the model in force
 /// leaves nothing of the rival's, 0 when they are alike. Arguments are mean squares.
 pub fn score(in_force: f64, rival: f64) -> f64 {
     let sum = in_force + rival;
     if sum > 0.0 { ((in_force - rival) / sum).clamp(-1.0, 1.0) } else { 0.0 }
 }
 
-/// The score of a rival whose error is this part of that of the model in force.
+/// Returns the score of a rival whose error is this part of that of the model in force.
 fn score_of_ratio(ratio: f64) -> f64 {
     score(1.0, ratio * ratio)
 }
 
-/// The error of the rival over that of the model in force, at a score; at most [`RATIO_MAX`].
+/// Returns the error of the rival over that of the model in force, at a score; at most [`RATIO_MAX`].
 fn ratio_of_score(score: f64) -> f64 {
     ((1.0 - score).max(0.0) / (1.0 + score).max(f64::MIN_POSITIVE)).sqrt().min(RATIO_MAX)
 }
@@ -77,12 +77,12 @@ impl RivalEvidence {
         }
     }
 
-    /// The least gain that it asks for.
+    /// Returns the least gain that it asks for.
     pub fn least_gain(&self) -> f64 {
         self.least_gain
     }
 
-    /// Trips that were compared.
+    /// Returns the trips that were compared.
     pub fn trips(&self) -> u64 {
         self.trips
     }
@@ -121,7 +121,7 @@ impl RivalEvidence {
         self.e_value.iter().sum::<f64>() / BETS.len() as f64
     }
 
-    /// The rival's error over that of the model in force in a typical trip: lower and upper end of
+    /// Returns the rival's error over that of the model in force in a typical trip: lower and upper end of
     /// an interval that holds the truth at all times at once with 95 %; [`RATIO_MAX`] where nothing
     /// bounds it above, `None` before the first trip.
     pub fn error_ratio(&self) -> Option<[f64; 2]> {
@@ -142,7 +142,7 @@ mod tests {
 
     use super::*;
 
-    /// Trips whose scores lie around a mean, each anywhere within `spread` of it.
+    /// Returns the trips whose scores lie around a mean, each anywhere within `spread` of it.
     fn e_value_reaches(
         mean: f64,
         spread: f64,

@@ -34,7 +34,7 @@ impl Sum {
         self.samples += error.count as u64;
     }
 
-    /// Root mean square in m/s; `None` without samples.
+    /// Returns the root mean square in m/s; `None` without samples.
     pub fn rmse_mps(&self) -> Option<f64> {
         (self.samples > 0).then(|| (self.squares / self.samples as f64).sqrt())
     }
@@ -131,7 +131,7 @@ impl OpenLoop {
     }
 }
 
-/// The difference of the distances over the time that they took; `None` where they cannot be compared.
+/// Returns the difference of the distances over the time that they took; `None` where they cannot be compared.
 fn distance_error_mps(recording: &OpenLoopRecording, predicted_mps: &[f64]) -> Option<f64> {
     let (samples, time_s) = (recording.samples(), recording.time_s());
     let (first, last) = (samples.first()?, samples.last()?);

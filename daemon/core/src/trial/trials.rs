@@ -35,7 +35,7 @@ pub struct Rival {
 }
 
 impl Rival {
-    /// A model with what is known of it already.
+    /// Returns a model with what is known of it already.
     pub fn new(
         model: u64,
         open_loop: OpenLoop,

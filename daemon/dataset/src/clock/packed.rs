@@ -36,7 +36,7 @@ impl Packed {
         self.last = number;
     }
 
-    /// The pattern; `None` for numbers that are none, or that do not show it.
+    /// Returns the pattern; `None` for numbers that are none, or that do not show it.
     pub fn pattern(&self) -> Option<&'static str> {
         match self {
             Packed { is_date: true, last, .. } if !last.is_nan() => Some(PACKED_DATE),

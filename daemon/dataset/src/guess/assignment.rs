@@ -1,4 +1,4 @@
-//! Which column is taken for which quantity, and which of the force columns, by their signs.
+//! Assignment of columns to quantities, those of forces by their signs.
 
 use std::cmp::Reverse;
 
@@ -192,7 +192,7 @@ impl<'c> Assignment<'c> {
         self.candidates.iter().find(is_it).map_or(0, |it| it.score)
     }
 
-    /// The first column that would be a quantity that nothing is taken for, were its unit known.
+    /// Returns the first column that would be a quantity that nothing is taken for, were its unit known.
     pub fn unknown_unit(&self) -> Option<(&'c InspectedColumn, Quantity, &str)> {
         let refused = self.refused.iter().find(|it| {
             it.reason.starts_with(UNKNOWN_UNIT)
@@ -216,7 +216,7 @@ impl<'c> Assignment<'c> {
         self.taken.iter().find(|it| it.guessed.quantity == quantity)
     }
 
-    /// True where a column is taken for the quantity.
+    /// Returns whether a column is taken for the quantity.
     pub fn has(&self, quantity: Quantity) -> bool {
         self.taken_for(quantity).is_some()
     }
@@ -308,7 +308,7 @@ impl<'c> Assignment<'c> {
         self.columns[index].name.shown()
     }
 
-    /// The columns that hold a quantity, with what was not taken for it, and the others.
+    /// Returns the columns that hold a quantity, with what was not taken for it, and the others.
     pub fn finish(mut self) -> (Vec<GuessedColumn>, Vec<Unmapped>) {
         for place in 0..self.taken.len() {
             let more = self.not_taken(self.taken[place].index, self.taken[place].guessed.quantity);

@@ -1,4 +1,4 @@
-//! The columns of all files together, with what their values are like.
+//! The columns of all files together, with facts on their values.
 use super::facts::Facts;
 use super::guessed::RecordingText;
 use super::layout::{GuessedLayout, layout};
@@ -83,7 +83,7 @@ impl InspectedColumns {
         Ok(InspectedColumns { layout: first, columns, rows })
     }
 
-    /// Every column's name, for messages.
+    /// Returns every column's name, for messages.
     pub fn names(&self) -> String {
         let names: Vec<String> =
             self.columns.iter().map(|column| format!("'{}'", column.name.shown())).collect();
@@ -91,7 +91,7 @@ impl InspectedColumns {
     }
 }
 
-/// Why no dataset can map a column of this name.
+/// Returns why no dataset can map a column of this name.
 fn unusable(name: &Name, files: &[RecordingText], layouts: &[GuessedLayout]) -> Option<String> {
     files.iter().zip(layouts).find_map(|(file, layout)| {
         match layout.header.iter().filter(|other| *other == name).count() {

@@ -28,13 +28,13 @@ impl Spread {
         }
     }
 
-    /// The mean; `None` without a value.
+    /// Returns the mean; `None` without a value.
     fn mean(&self) -> Option<f64> {
         let count = self.values.len();
         (count > 0).then(|| self.values.iter().sum::<f64>() / count as f64)
     }
 
-    /// The value below which this share of the values' magnitudes lies.
+    /// Returns the value below which this share of the values' magnitudes lies.
     fn quantile(&self, share: f64, of: impl Fn(f64) -> f64) -> Option<f64> {
         let mut sorted: Vec<f64> = self.values.iter().map(|&value| of(value)).collect();
         sorted.sort_by(f64::total_cmp);
@@ -55,7 +55,7 @@ pub struct TextCell {
 }
 
 impl TextCell {
-    /// The same, with its file where there are several.
+    /// Returns the same, with its file where there are several.
     pub fn of_file(self, label: &str, files: usize) -> Self {
         let file = if files > 1 { format!("{label}, ") } else { String::new() };
         TextCell { file, ..self }
@@ -94,7 +94,7 @@ pub struct Facts {
 const FALLING_MIN: usize = 20;
 
 impl Facts {
-    /// Nothing seen yet.
+    /// Returns nothing seen yet.
     pub fn new() -> Self {
         let (min, max) = (f64::INFINITY, f64::NEG_INFINITY);
         Facts { min, max, last: f64::NAN, packed: Some(Packed::NEW), ..Facts::default() }
@@ -116,12 +116,12 @@ impl Facts {
         }
     }
 
-    /// True while every cell so far was empty or a time.
+    /// Returns whether every cell so far was empty or a time.
     fn may_hold_times(&self) -> bool {
         self.text.is_none() && (self.numbers == 0 || !self.clocks.is_empty())
     }
 
-    /// A cell's time in the likeliest format that holds for all cells so far.
+    /// Returns a cell's time in the likeliest format that holds for all cells so far.
     fn time_s(&mut self, cell: &[u8]) -> Option<f64> {
         if self.clocks.is_empty() {
             self.day = self.day.or_else(|| day_of_cell(cell));
@@ -138,7 +138,7 @@ impl Facts {
         times_s.first().copied()
     }
 
-    /// The formats in which every value is a time, the likeliest first; none for numbers.
+    /// Returns the formats in which every value is a time, the likeliest first; none for numbers.
     pub fn formats(&self) -> Vec<&TimeFormat> {
         self.clocks.iter().map(DayClock::format).collect()
     }
@@ -196,22 +196,22 @@ impl Facts {
         other.steps.values.iter().for_each(|&step| self.steps.push(step));
     }
 
-    /// The greatest magnitude, single spikes left out; `None` without a number.
+    /// Returns the greatest magnitude, single spikes left out; `None` without a number.
     pub fn top(&self) -> Option<f64> {
         self.values.quantile(0.99, f64::abs)
     }
 
-    /// The mean; `None` without a number.
+    /// Returns the mean; `None` without a number.
     pub fn mean(&self) -> Option<f64> {
         self.values.mean()
     }
 
-    /// The middle value; `None` without a number.
+    /// Returns the middle value; `None` without a number.
     pub fn middle(&self) -> Option<f64> {
         self.values.quantile(0.5, |value| value)
     }
 
-    /// The middle of the steps between rows; `None` with less than two numbers.
+    /// Returns the middle of the steps between rows; `None` with less than two numbers.
     pub fn step(&self) -> Option<f64> {
         self.steps.quantile(0.5, |step| step)
     }
@@ -221,19 +221,19 @@ impl Facts {
         (self.numbers > 0).then_some(self.max - self.min)
     }
 
-    /// True where nearly every number is greater than the one before, or as great.
+    /// Returns whether nearly every number is greater than the one before, or as great.
     pub fn grows(&self) -> bool {
         let changing = self.growing + self.falling;
         // Several rows may share a whole second; rows in disorder fall as often as they grow.
         self.growing > 0 && self.growing * 10 >= changing * 3 && self.growing * 50 >= self.pairs
     }
 
-    /// True where nearly every number is less than the one before: of times, the newest stands first.
+    /// Returns whether nearly every number is less than the one before: of times, the newest stands first.
     pub fn falls(&self) -> bool {
         self.falling * 50 >= self.pairs * 49 && self.falling >= FALLING_MIN
     }
 
-    /// The format in which the numbers are packed times.
+    /// Returns the format in which the numbers are packed times.
     pub fn packed(&self) -> Option<TimeFormat> {
         self.packed?.pattern().map(|it| TimeFormat::Pattern(it.into()))
     }
@@ -243,7 +243,7 @@ impl Facts {
         if self.falling > self.growing { -1 } else { 1 }
     }
 
-    /// The shares of the values that are above and below zero by more than noise.
+    /// Returns the shares of the values that are above and below zero by more than noise.
     pub fn signs(&self) -> (f64, f64) {
         let least = 0.02 * self.top().unwrap_or(0.0);
         let share = |sign: f64| {

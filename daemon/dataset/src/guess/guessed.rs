@@ -100,7 +100,8 @@ impl Guess {
 }
 
 impl GuessedColumn {
-    /// A column by its name and what its values are like, in a unit that is given, or by the one that its name says.
+    /// Returns a column by its name and what its values are like, in a unit that is given, or by the one that its name
+    /// says.
     pub(super) fn new(
         (name, facts): (&Name, &Facts),
         quantity: Quantity,
@@ -137,12 +138,12 @@ impl GuessedColumn {
         }
     }
 
-    /// The same, its cells times in the format that is given.
+    /// Returns the same, its cells times in the format that is given.
     pub(super) fn given_as(self, format: Option<&TimeFormat>) -> Self {
         format.map_or(self.clone(), |format| self.written_as(format, &[]))
     }
 
-    /// The same, its cells times in a format; in others they could be, too.
+    /// Returns the same, its cells times in a format; in others they could be, too.
     fn written_as(mut self, format: &TimeFormat, others: &[&TimeFormat]) -> Self {
         self.reasons[1] = format!("its cells are times as {}", format.example());
         // A day without a leading zero is read where one stands, too.
@@ -246,7 +247,7 @@ impl Guess {
     }
 }
 
-/// True for what the balance of forces shows.
+/// Returns true for what the balance of forces shows.
 fn needs_balance(fault: InputFault) -> bool {
     matches!(
         fault,

@@ -1,4 +1,4 @@
-//! How a file's text falls into cells: delimiter, decimal mark, the lines above the names, names and units.
+//! Splitting a file's text into cells: delimiter, decimal mark, the lines above the names, names and units.
 use dynocar_model::units::is_unit;
 
 use super::name::Name;
@@ -120,23 +120,23 @@ impl Row {
         self.cells.iter().map(|cell| cell.trim()).filter(|cell| !cell.is_empty())
     }
 
-    /// Cells that hold a number or a time.
+    /// Returns the cells that hold a number or a time.
     fn values(&self) -> usize {
         self.filled().filter(|cell| is_value(cell)).count()
     }
 
-    /// True where most cells hold values.
+    /// Returns whether most cells hold values.
     fn is_of_values(&self) -> bool {
         2 * self.values() > self.filled().count()
     }
 
-    /// True for words: names, units. The unit of a share is 1; what is missing among values may be a name.
+    /// Returns true for words: names, units. The unit of a share is 1; what is missing among values may be a name.
     fn is_of_words(&self) -> bool {
         let mut own = self.filled().filter(|cell| *cell != "1").peekable();
         own.peek().is_some() && !own.any(|cell| is_value(cell) && !is_missing(cell))
     }
 
-    /// True for the names of types of numbers and times.
+    /// Returns true for the names of types of numbers and times.
     fn is_of_types(&self) -> bool {
         let is_type = |cell: &str| {
             // ClickHouse writes `Nullable(DateTime64(6))`.
@@ -148,7 +148,7 @@ impl Row {
         self.filled().next().is_some() && self.filled().all(is_type)
     }
 
-    /// True where at least half of the cells are units and none is a value. Letters alone are as well the
+    /// Returns whether at least half of the cells are units and none is a value. Letters alone are as well the
     /// names of columns: t, v, F; but not where less of them stand there than above.
     fn is_of_units(&self, names: &Row) -> bool {
         let cells: Vec<String> = self.filled().map(without_brackets).collect();
@@ -166,7 +166,7 @@ fn is_value(cell: &str) -> bool {
     is_plain(b'.') || is_plain(b',') || is_grouped(cell) || !TimeFormat::of_cell(cell).is_empty()
 }
 
-/// True for a number with marks between its groups of three digits.
+/// Returns true for a number with marks between its groups of three digits.
 fn is_grouped(cell: &[u8]) -> bool {
     let Ok(text) = std::str::from_utf8(cell) else { return false };
     let is_it = |mark: char| {
@@ -181,7 +181,7 @@ fn without_brackets(cell: &str) -> String {
     cell.trim().trim_matches(['[', ']', '(', ')']).to_string()
 }
 
-/// Where names and units stand: in the words above the first two rows of values that follow each other;
+/// Returns where names and units stand: in the words above the first two rows of values that follow each other;
 /// `None` where there are values and no words above them.
 fn block(rows: &[Row]) -> Option<Block> {
     let is_start = |index: &usize| {
@@ -201,12 +201,12 @@ fn block(rows: &[Row]) -> Option<Block> {
     Some(Block { header: above.unwrap_or(words), units: above.map(|_| words) })
 }
 
-/// True for a line of units that stands below names itself.
+/// Returns true for a line of units that stands below names itself.
 fn is_below_names(rows: &[Row], at: usize) -> bool {
     at.checked_sub(1).is_some_and(|above| rows[at].is_of_units(&rows[above]))
 }
 
-/// How well the rows fall into columns: the more columns the better, where rows agree on them with
+/// Returns how well the rows fall into columns: the more columns the better, where rows agree on them with
 /// each other and with the header.
 fn fit(block: Option<Block>, rows: &[Row]) -> f64 {
     let rows = &rows[block.map_or(0, |block| block.header)..];
@@ -216,7 +216,7 @@ fn fit(block: Option<Block>, rows: &[Row]) -> f64 {
     of_header * width as f64 * (agree as f64 / rows.len() as f64).powi(2)
 }
 
-/// The number of cells that most rows have.
+/// Returns the number of cells that most rows have.
 fn usual_width(rows: &[Row]) -> Option<usize> {
     let mut widths: Vec<usize> = rows.iter().map(|row| row.cells.len()).collect();
     widths.sort_unstable();

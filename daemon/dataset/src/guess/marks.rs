@@ -1,4 +1,4 @@
-//! Which marks stand in numbers: before their fraction, and between groups of three digits.
+//! Marks in numbers: before their fraction, and between groups of three digits.
 
 use crate::cell::{is_word, ungrouped};
 use crate::lines::{CellRow, RowReader};
@@ -71,7 +71,7 @@ impl MarkEvidence {
         }
     }
 
-    /// The marks; without any evidence a point and nothing.
+    /// Returns the marks; without any evidence a point and nothing.
     pub fn marks(&self) -> Marks {
         let (commas, points) = match (self.commas, self.points) {
             (0, 0) => (self.either_comma, self.either_point),

@@ -1,4 +1,4 @@
-//! Which quantity a column's name and values speak for.
+//! Scores of a quantity for a column, by its name and its values.
 
 use dynocar_model::units::{Dimension, Unit, is_unit};
 
@@ -30,8 +30,8 @@ struct Match {
     unit: Option<Unit>,
 }
 
-/// Whether a column may hold a quantity, and its score, the greater the likelier: `None` where nothing speaks for
-/// it, an error where the name does but something else speaks against it.
+/// Returns whether a column may hold a quantity, and its score, the greater the likelier: `None` where nothing speaks
+/// for it, an error where the name does but something else speaks against it.
 pub fn consider(
     name: &Name,
     facts: &Facts,
@@ -111,12 +111,12 @@ pub fn can_hold(facts: &Facts, quantity: Quantity) -> Result<(), String> {
     }
 }
 
-/// A column of times, whatever its name.
+/// Returns a column of times, whatever its name.
 fn by_cells() -> Match {
     Match { score: SURE, reason: "what it holds".into(), unit: None }
 }
 
-/// The best that a name says of a quantity, or what in it speaks against it.
+/// Returns the best that a name says of a quantity, or what in it speaks against it.
 fn by_name(name: &Name, quantity: Quantity) -> Option<Result<Match, String>> {
     let best = readings(name, quantity)
         .into_iter()
@@ -191,14 +191,14 @@ fn by_term(words: &[String], strength: TermWeight, term: &str) -> Option<i32> {
     Some(base + wanted.len() as i32 - 2 * neutral)
 }
 
-/// A term within a longer word, as words are joined in German.
+/// Returns a term within a longer word, as words are joined in German.
 fn within(words: &[String], strength: TermWeight, joined: &str) -> Option<i32> {
     let is_long = strength == TermWeight::Named && joined.len() >= WITHIN_MIN;
     let holds = |word: &String| word.len() > joined.len() && word.contains(joined);
     (is_long && words.iter().any(holds)).then(|| 70 - 10 * (words.len() as i32 - 1))
 }
 
-/// A name that was mistyped.
+/// Returns a name that was mistyped.
 fn by_likeness(words: &[String], quantity: Quantity) -> Option<(i32, String)> {
     let joined = words.concat();
     let all = || {
@@ -224,7 +224,7 @@ fn by_likeness(words: &[String], quantity: Quantity) -> Option<(i32, String)> {
     (is_meant && is_alike).then(|| (50, format!("that the name is like '{nearest}'")))
 }
 
-/// A column of which only the unit speaks: of what trains record in km/h it is the speed; and T is
+/// Returns a column of which only the unit speaks: of what trains record in km/h it is the speed; and T is
 /// a temperature beside the unit of one.
 fn by_unit_alone(name: &Name, quantity: Quantity) -> Option<Match> {
     let unit = Unit::spelled(quantity.dimension(), name.unit.as_ref()?)?;
@@ -260,7 +260,7 @@ fn contradiction(words: &[String], quantity: Quantity) -> Option<String> {
     None
 }
 
-/// Greatest magnitude and mean of a column's values in the base unit, as it is taken.
+/// Returns the greatest magnitude and mean of a column's values in the base unit, as it is taken.
 pub fn figures(facts: &Facts, guessed: &GuessedColumn) -> [f64; 2] {
     let figures = [facts.top(), facts.mean()];
     figures.map(|it| guessed.unit.to_base(it.unwrap_or(f64::NAN) * guessed.scale))

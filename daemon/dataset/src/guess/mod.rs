@@ -7,13 +7,13 @@
 //!
 //! # Layout, in the order of the work
 //!
-//! - `layout`, `columns`, `facts`: delimiter, decimal mark, names and units; what the values are like
+//! - `layout`, `columns`, `facts`: delimiter, decimal mark, names and units; facts on the values
 //! - `marks`: which marks stand in numbers
 //! - `name`, `vocabulary`: a name in words, units as people write them, what recorders
 //!   call the quantities
 //! - `matching`, `plausible`: which quantity a column speaks for, and its likeliest unit
 //! - `assignment`: one column for each quantity
-//! - [`guessed`]: what comes out, and its correction
+//! - [`guessed`]: the guess, and its correction
 
 mod assignment;
 mod columns;

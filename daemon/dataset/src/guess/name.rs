@@ -28,12 +28,12 @@ impl Name {
         Name { text: text.into(), words: words(&rest), unit }
     }
 
-    /// The name with a unit that stands elsewhere, unless it has its own.
+    /// Returns the name with a unit that stands elsewhere, unless it has its own.
     pub fn with_unit(self, unit: Option<String>) -> Self {
         Name { unit: self.unit.or(unit), ..self }
     }
 
-    /// The words without what numbers a part of a whole; `None` where nothing does.
+    /// Returns the words without what numbers a part of a whole; `None` where nothing does.
     pub fn without_number(&self) -> Option<Vec<&str>> {
         let is_letter = |word: &str| matches!(word, "a" | "b" | "c" | "d");
         let is_number = |word: &&str| {
@@ -46,14 +46,14 @@ impl Name {
         (!numbers.is_empty() && !rest.is_empty()).then_some(rest)
     }
 
-    /// The name for messages: one line of at most 60 letters.
+    /// Returns the name for messages: one line of at most 60 letters.
     pub fn shown(&self) -> String {
         let letters = self.text.chars().take(60);
         letters.map(|letter| if letter.is_control() { ' ' } else { letter }).collect()
     }
 }
 
-/// The unit that a column's name gives for a quantity.
+/// Returns the unit that a column's name gives for a quantity.
 pub fn named_unit(name: &Name, quantity: Quantity) -> Option<Unit> {
     if let Some(text) = &name.unit {
         return Unit::spelled(quantity.dimension(), text);
@@ -61,7 +61,7 @@ pub fn named_unit(name: &Name, quantity: Quantity) -> Option<Unit> {
     readings(name, quantity).into_iter().rev().find_map(|(_, unit)| unit)
 }
 
-/// The words of a name and, for each way to see a unit in its last words, what is left of them.
+/// Returns the words of a name and, for each way to see a unit in its last words, what is left of them.
 pub fn readings(name: &Name, quantity: Quantity) -> Vec<(&[String], Option<Unit>)> {
     let words = &name.words[..];
     let mut readings = vec![(words, None)];
@@ -80,7 +80,7 @@ pub fn readings(name: &Name, quantity: Quantity) -> Vec<(&[String], Option<Unit>
     readings
 }
 
-/// The name without its unit, and the unit: in brackets, behind ` / ` as DIN 461 writes axes, or
+/// Returns the name without its unit, and the unit: in brackets, behind ` / ` as DIN 461 writes axes, or
 /// behind `in`.
 fn split_unit(text: &str) -> (String, Option<String>) {
     for (open, close) in [('[', ']'), ('(', ')'), ('{', '}'), ('<', '>')] {
@@ -104,7 +104,7 @@ fn split_unit(text: &str) -> (String, Option<String>) {
     (text.into(), None)
 }
 
-/// True for what stands in brackets as units do and is none that is known: a word in square ones, and in others
+/// Returns true for what stands in brackets as units do and is none that is known: a word in square ones, and in others
 /// what is written with a unit's marks.
 fn looks_like_unit(inside: &str, open: char) -> bool {
     let inside = inside.trim();
@@ -119,7 +119,8 @@ fn looks_like_unit(inside: &str, open: char) -> bool {
         || !known && (has_mark || (open == '[' && has_letters && !inside.contains(' ')))
 }
 
-/// The text in a name's brackets where that is a multiple of a unit of the quantity, as `0.1 kN` or `x1000 lbs`.
+/// Returns the text in a name's brackets where that is a multiple of a unit of the quantity, as `0.1 kN` or `x1000
+/// lbs`.
 pub fn scaled_unit(name: &Name, quantity: Quantity) -> Option<&str> {
     let spelled = |text: &str| Unit::spelled(quantity.dimension(), text).is_some();
     let (_, inside) = name.text.rsplit_once(['[', '('])?;
@@ -131,7 +132,7 @@ pub fn scaled_unit(name: &Name, quantity: Quantity) -> Option<&str> {
     is_scaled.then_some(inside)
 }
 
-/// The words of a name: separated by marks, by capitals and by digits.
+/// Returns the words of a name: separated by marks, by capitals and by digits.
 fn words(text: &str) -> Vec<String> {
     let letters: Vec<char> = text.chars().collect();
     let mut words: Vec<String> = Vec::new();
@@ -154,7 +155,7 @@ fn words(text: &str) -> Vec<String> {
     words
 }
 
-/// True where a new word begins without a mark: `tractionForce`, `FTrac`, `vIst`, `speed2`; but kN
+/// Returns whether a new word begins without a mark: `tractionForce`, `FTrac`, `vIst`, `speed2`; but kN
 /// is one word.
 fn begins_word(before: char, letter: char, next: Option<char>, word: &str) -> bool {
     let is_small_next = next.is_some_and(char::is_lowercase);

@@ -1,4 +1,4 @@
-//! Which unit makes a column's values those of a train.
+//! The unit by which a column's values are those of a train.
 
 use dynocar_model::units::Unit;
 
@@ -29,7 +29,7 @@ pub struct UnitChoice {
 }
 
 impl Usual {
-    /// The figure that reveals a column's unit, and what it is in words; `None` where it reveals nothing.
+    /// Returns the figure that reveals a column's unit, and what it is in words; `None` where it reveals nothing.
     fn figure(&self, facts: &Facts) -> Option<(f64, String)> {
         let (words, figure) = match self.measure {
             Measure::Top => ("values up to", facts.top()),
@@ -41,7 +41,7 @@ impl Usual {
         Some((figure, format!("{words} {}", number(figure))))
     }
 
-    /// How far a value in the base unit is from what is usual, as a factor's logarithm; 0 within.
+    /// Returns how far a value in the base unit is from what is usual, as a factor's logarithm; 0 within.
     fn distance(&self, base: f64) -> f64 {
         if (self.low..=self.high).contains(&base) {
             return 0.0;
@@ -54,7 +54,7 @@ impl Usual {
     }
 }
 
-/// The unit of a column: the one that its name gives, else the likeliest by its values.
+/// Returns the unit of a column: the one that its name gives, else the likeliest by its values.
 pub fn choose_unit(quantity: Quantity, facts: &Facts, named: Option<Unit>) -> UnitChoice {
     let shown = usual(quantity).and_then(|usual| Some((usual, usual.figure(facts)?)));
     match (named, shown) {
@@ -74,7 +74,7 @@ fn said(unit: Unit) -> UnitChoice {
     UnitChoice { unit, scale: 1.0, reason: "the unit that the name gives".into(), doubt: None }
 }
 
-/// Whether values can be in the unit that the name gives.
+/// Returns whether values can be in the unit that the name gives.
 fn judge(unit: Unit, usual: &Usual, (figure, words): (f64, String)) -> UnitChoice {
     let base = |scale: f64| unit.to_base(figure * scale);
     let distance = usual.distance(base(1.0));
@@ -90,7 +90,7 @@ fn judge(unit: Unit, usual: &Usual, (figure, words): (f64, String)) -> UnitChoic
     UnitChoice { doubt: Some(doubt), ..said(unit) }
 }
 
-/// The likeliest unit where the name gives none.
+/// Returns the likeliest unit where the name gives none.
 fn by_values(
     quantity: Quantity,
     usual: &Usual,
@@ -127,7 +127,7 @@ fn by_values(
     UnitChoice { unit, scale: 1.0, reason, doubt: Some(doubt) }
 }
 
-/// A number in few letters.
+/// Returns a number in few letters.
 fn number(value: f64) -> String {
     let size = value.abs();
     if !(0.01..1e6).contains(&size) {
@@ -145,7 +145,7 @@ fn number(value: f64) -> String {
 mod tests {
     use super::*;
 
-    /// Values from 0 up to a top.
+    /// Returns the values from 0 up to a top.
     fn ramp(top: f64) -> Facts {
         let mut facts = Facts::new();
         (0..=100).for_each(|row| facts.push(f64::from(row) * top / 100.0));

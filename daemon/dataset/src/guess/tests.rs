@@ -6,7 +6,7 @@ mod others;
 use crate::TimeFormat;
 use Quantity::*;
 
-/// A run that pulls, coasts and brakes, as rows of time, position, speed, traction and brake force
+/// Returns a run that pulls, coasts and brakes, as rows of time, position, speed, traction and brake force
 /// in SI units.
 fn run() -> Vec<[f64; 5]> {
     let (mut speed, mut position) = (0.0_f64, 1000.0);

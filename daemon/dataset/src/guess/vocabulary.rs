@@ -93,7 +93,7 @@ pub static VOCABULARY: LazyLock<Vocabulary> = LazyLock::new(|| {
         .expect("the vocabulary is as its readers take it")
 });
 
-/// The entries of a list.
+/// Returns the entries of a list.
 pub fn listed(list: &str) -> impl Iterator<Item = &str> {
     list.split(", ").filter(|term| !term.is_empty())
 }
@@ -121,7 +121,7 @@ pub fn terms(quantity: Quantity) -> impl Iterator<Item = (TermWeight, &'static s
     TERMS[&quantity].iter().map(|(weight, term)| (*weight, term.as_str()))
 }
 
-/// True for a word that a name may hold besides its unit.
+/// Returns true for a word that a name may hold besides its unit.
 pub fn is_word(word: &str) -> bool {
     let words = &VOCABULARY.words;
     let lists = [&words.neutral, &words.parts, &words.vehicles, &words.not_measured, &words.about];

@@ -166,7 +166,7 @@ fn lines_above_the_names_and_units_below_them_are_passed_over() {
     );
 }
 
-/// The times of a file in a format, and its first day.
+/// Returns the times of a file in a format, and its first day.
 fn times(format: &str, text: &str) -> Result<(Vec<f64>, Option<i64>), String> {
     let mut manifest = manifest("delimiter = \";\"\ndecimal = \",\"");
     manifest.columns[0].format = TimeFormat::from_name(format);

@@ -58,12 +58,12 @@ pub struct CoastingSegments {
 }
 
 impl CoastingSegments {
-    /// A builder without samples.
+    /// Returns a builder without samples.
     pub fn new(settings: DataSettings) -> Self {
         CoastingSegments { settings, watch: SpeedWatch::new(settings.spike_mps), chain: None }
     }
 
-    /// Noise of the speed so far.
+    /// Returns the noise of the speed so far.
     pub fn noise(&self) -> &SpeedNoise {
         &self.watch.noise
     }
@@ -183,7 +183,7 @@ impl Half {
         self.rest.push(time_s, now.speed_mps - gained / now.inertia);
     }
 
-    /// The slopes over this half and the next.
+    /// Returns the slopes over this half and the next.
     fn slopes(&self, next: &Half) -> Option<MomentumColumns> {
         let mut row = MomentumColumns::zeros();
         for column in 0..1 + PARAMETERS {
@@ -192,7 +192,7 @@ impl Half {
         Some(row)
     }
 
-    /// Sum of squares of the times over this half and the next.
+    /// Returns the sum of squares of the times over this half and the next.
     fn spread(&self, next: &Half) -> f64 {
         self.rest.joined(&next.rest).spread()
     }
@@ -213,7 +213,7 @@ mod tests {
         samples.iter().filter_map(|sample| builder.push(sample, &DAVIS).unwrap()).collect()
     }
 
-    /// The resistance of a segment over the true one of its regressors, less one.
+    /// Returns the resistance of a segment over the true one of its regressors, less one.
     fn relative_error(segment: &CoastingSegment) -> f64 {
         let truth: f64 = (0..PARAMETERS).map(|i| scaled(&DAVIS)[i] * segment.row[i + 1]).sum();
         segment.row[0] / truth - 1.0

@@ -40,7 +40,7 @@ fn start(data: &DataSettings, variance: f64, uses: f64) -> Unknowns {
     })
 }
 
-/// Weights of the noise bank's penalty: lambda/2 on the resistance, the forces' own priors.
+/// Returns the weights of the noise bank's penalty: lambda/2 on the resistance, the forces' own priors.
 pub fn bank_penalty(data: &DataSettings, lambda: f64) -> Unknowns {
     let forces = force_variances(data);
     Unknowns::from_fn(|i, _| match i.checked_sub(PARAMETERS) {
@@ -110,7 +110,7 @@ impl Solver {
         }
     }
 
-    /// The solution so far; `None` while there is none.
+    /// Returns the solution so far; `None` while there is none.
     pub fn solution(&self, bank: &NoiseBank) -> Option<RegressionSolution> {
         let (estimate, covariance) = match self {
             Solver::Batch => return bank.mixture,

@@ -65,7 +65,7 @@ pub struct ResistanceKalman {
 }
 
 impl ResistanceKalman {
-    /// A filter for a train; `beside` learns the noise.
+    /// Returns a filter for a train; `beside` learns the noise.
     pub fn new(
         train: &TrainModel,
         settings: KalmanSettings,
@@ -158,7 +158,7 @@ impl ResistanceKalman {
         }
     }
 
-    /// Variance of the impulse by what is not known of when and where the forces acted.
+    /// Returns the variance of the impulse by what is not known of when and where the forces acted.
     fn impulse_variance(&self, before: &UnitSample, now: &UnitSample, change: f64) -> f64 {
         let data = &self.settings.data;
         let step_s = now.seconds_since(before);
@@ -209,7 +209,7 @@ impl ResistanceKalman {
         self.resets += 1;
     }
 
-    /// Variance of the speed in (m/s)² while a force that acts later by d changes: its impulse
+    /// Returns the variance of the speed in (m/s)² while a force that acts later by d changes: its impulse
     /// is taken as d times the change at once, and is off by half d² times the rate until then.
     fn transient_variance(&mut self, before: &UnitSample, now: &UnitSample) -> f64 {
         let step_s = now.seconds_since(before);
@@ -269,7 +269,7 @@ impl ResistanceKalman {
         self.filter = Gaussian { mean, covariance: joint };
     }
 
-    /// Speed and disturbance for given unknowns, as this filter knows them.
+    /// Returns the speed and disturbance for given unknowns, as this filter knows them.
     fn own_motion(&self) -> Option<AffineMotion> {
         let (mean, covariance) = (&self.filter.mean, &self.filter.covariance);
         let tie = covariance.fixed_view::<UNKNOWNS, FIRST_UNKNOWN>(FIRST_UNKNOWN, 0).into_owned();
@@ -283,7 +283,7 @@ impl ResistanceKalman {
         })
     }
 
-    /// The disturbance now with its standard deviation, in N/kN.
+    /// Returns the disturbance now with its standard deviation, in N/kN.
     fn disturbance(&self) -> (f64, f64) {
         let variance = self.filter.covariance[(DISTURBANCE, DISTURBANCE)];
         (self.filter.mean[DISTURBANCE], variance.max(0.0).sqrt())
@@ -318,12 +318,12 @@ fn filter_at(solution: &RegressionSolution) -> Gaussian<STATES> {
     Gaussian { mean, covariance }
 }
 
-/// Weight of an observation by the square of its normalised innovation.
+/// Returns the weight of an observation by the square of its normalised innovation.
 fn student_weight(square: f64, freedom: f64) -> f64 {
     ((freedom + 1.0) / (freedom + square)).min(1.0)
 }
 
-/// Mean of the weight over standard normal innovations, by the midpoint rule.
+/// Returns the mean of the weight over standard normal innovations, by the midpoint rule.
 fn mean_student_weight(freedom: f64) -> f64 {
     const STEPS: usize = 400;
     const STEP: f64 = 8.0 / STEPS as f64;

@@ -1,9 +1,9 @@
 //! The pipelines `ls`, `rls`, `regularised_rls`, `mils` and `v_mils`.
 
 use dynocar_core::filter::RunningMedian;
-use dynocar_core::pipeline::estimator::{DAVIS, write_innovations, write_parameters};
 use dynocar_core::pipeline::judge::{InputState, Judgement, missing};
 use dynocar_core::pipeline::momentum::{DataSettings, PARAMETERS, UnitSample, scaled, unscaling};
+use dynocar_core::pipeline::output::{DAVIS, write_innovations, write_parameters};
 use dynocar_core::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{Davis, TrainModel};
@@ -65,7 +65,7 @@ pub struct ResistanceLeastSquares {
 }
 
 impl ResistanceLeastSquares {
-    /// An estimator for a train; `lambda` is the noise bank's, `forgetting` its weight kept per
+    /// Returns an estimator for a train; `lambda` is the noise bank's, `forgetting` its weight kept per
     /// row.
     pub fn new(
         kind: PipelineKind,
@@ -100,7 +100,7 @@ impl ResistanceLeastSquares {
         }
     }
 
-    /// The innovation of a row over its standard deviation.
+    /// Returns the innovation of a row over its standard deviation.
     fn normalised(&self, row: &WhiteRow) -> f64 {
         let own = self.solution.filter(|_| self.is_warm());
         let RegressionSolution { estimate, covariance } = own.unwrap_or(self.declared);
@@ -173,19 +173,19 @@ impl ResistanceLeastSquares {
         }
     }
 
-    /// Speed and disturbance at the newest sample, which closed a block that was taken in;
+    /// Returns the speed and disturbance at the newest sample, which closed a block that was taken in;
     /// `None` when the source has no blocks.
     pub(super) fn motion(&self) -> Option<AffineMotion> {
         let since = self.source.since_block()?;
         Some(self.bank.likeliest_motion(&since))
     }
 
-    /// True when the newest row was refused.
+    /// Returns whether the newest row was refused.
     pub(super) fn has_refused_row(&self) -> bool {
         self.refused_in_a_row > 0 || self.jump_n_per_kn.is_some()
     }
 
-    /// True once there are rows enough for an own solution.
+    /// Returns whether there are rows enough for an own solution.
     pub(super) fn is_warm(&self) -> bool {
         self.bank.count() >= ROWS_BEFORE_OWN
     }
@@ -300,7 +300,7 @@ impl Estimator for ResistanceLeastSquares {
         self.write_with(&self.report, &self.monitor, snapshot)
     }
 
-    /// The kept coefficients take the place of the declared ones, and are known to every noise
+    /// Returns the kept coefficients take the place of the declared ones, and are known to every noise
     /// model with their covariance. A reset for numerical failure forgets the latter.
     fn warm_start(&mut self, kept: &KeptEstimate) -> bool {
         let Some((davis, covariance)) = kept.moments(DAVIS) else { return false };
@@ -326,7 +326,7 @@ impl Estimator for ResistanceLeastSquares {
     }
 }
 
-/// The declared resistance as a start, trusted to half its value and 1 N/kN; the forces as the
+/// Returns the declared resistance as a start, trusted to half its value and 1 N/kN; the forces as the
 /// settings trust them.
 fn declared_solution(train: &TrainModel, settings: &DataSettings) -> RegressionSolution {
     let declared = scaled(&train.resistance);

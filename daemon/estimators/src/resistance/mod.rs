@@ -85,7 +85,7 @@ pub fn regularised(
     Ok(ResistanceLeastSquares::new(kind, train, settings.data, solver, settings.lambda, 1.0))
 }
 
-/// A robust Kalman filter with a disturbance state.
+/// Returns a robust Kalman filter with a disturbance state.
 ///
 /// # Errors
 ///

@@ -67,7 +67,7 @@ pub struct NoiseBank {
 }
 
 impl NoiseBank {
-    /// A bank without rows, every model with the penalty `sum of weight * unknown^2`.
+    /// Returns a bank without rows, every model with the penalty `sum of weight * unknown^2`.
     pub fn new(penalty: &Unknowns, forgetting: f64) -> Self {
         let disturbance = |index: usize| match index.checked_sub(1) {
             None => Disturbance { std_n_per_kn: 0.0, time_s: TIMES_S[0] },
@@ -164,23 +164,23 @@ impl NoiseBank {
         }
     }
 
-    /// Rows taken in, the forgotten ones in part.
+    /// Returns the rows taken in, the forgotten ones in part.
     pub fn count(&self) -> f64 {
         self.undisturbed().count()
     }
 
-    /// The likeliest model's own solution; `None` while the rows do not determine it.
+    /// Returns the likeliest model's own solution; `None` while the rows do not determine it.
     pub fn likeliest_solution(&self) -> Option<RegressionSolution> {
         let cached = self.solutions[self.models.likeliest_index()];
         cached.or_else(|| self.models.likeliest().solution())
     }
 
-    /// Speed and disturbance by the likeliest model, so long after the newest block.
+    /// Returns the speed and disturbance by the likeliest model, so long after the newest block.
     pub fn likeliest_motion(&self, since: &SinceBlock) -> AffineMotion {
         self.models.likeliest().motion(since)
     }
 
-    /// The likeliest noise model.
+    /// Returns the likeliest noise model.
     pub fn likeliest_noise(&self) -> LikeliestNoise {
         let model = self.models.likeliest();
         let scale = model.scale();
@@ -189,12 +189,12 @@ impl NoiseBank {
         LikeliestNoise { index: self.models.likeliest_index(), disturbance, scale }
     }
 
-    /// The disturbance now, in N/kN for given unknowns, with its standard deviation.
+    /// Returns the disturbance now, in N/kN for given unknowns, with its standard deviation.
     pub fn disturbance(&self, unknowns: &Unknowns) -> (f64, f64) {
         self.models.likeliest().disturbance_now(unknowns)
     }
 
-    /// A solution from the likeliest model's rows, its covariance of a, b, c widened as the
+    /// Returns a solution from the likeliest model's rows, its covariance of a, b, c widened as the
     /// mixture's is against that model's: the disturbance is itself uncertain. `None` while there
     /// is no mixture.
     ///
@@ -218,7 +218,7 @@ impl NoiseBank {
         Some(RegressionSolution { estimate: solution.estimate, covariance })
     }
 
-    /// The slow force that the model does not know, over all models.
+    /// Returns the slow force that the model does not know, over all models.
     pub fn disturbed(&self) -> Disturbed {
         if self.mixture.is_none() {
             return Disturbed { std_n_per_kn: 0.0, evidence: 0.0 };
@@ -232,7 +232,7 @@ impl NoiseBank {
         Disturbed { std_n_per_kn: variance.sqrt(), evidence: 2.0 * gain }
     }
 
-    /// The mixture of the likeliest models that together have so much of the probability, each
+    /// Returns the mixture of the likeliest models that together have so much of the probability, each
     /// covariance times a factor.
     fn mix(&self, probability: f64, factor: f64) -> Option<RegressionSolution> {
         let mut order: [usize; MODELS] = std::array::from_fn(|index| index);
@@ -285,7 +285,7 @@ impl NoiseBank {
     }
 }
 
-/// Logarithm of a model's probability before any row.
+/// Returns the logarithm of a model's probability before any row.
 fn log_prior(index: usize) -> f64 {
     match index {
         0 => UNDISTURBED_PRIOR.ln(),

@@ -1,4 +1,4 @@
-//! Where the observations of the regression come from.
+//! Sources of the observations of the regression.
 
 use dynocar_core::pipeline::momentum::blocks::MomentumBlocks;
 use dynocar_core::pipeline::momentum::{DataSettings, DataSource, SinceBlock, UnitSample};
@@ -23,7 +23,7 @@ pub struct RowSource {
 }
 
 impl RowSource {
-    /// A source without samples.
+    /// Returns a source without samples.
     pub fn new(settings: DataSettings) -> Self {
         let builder = match settings.source {
             DataSource::Momentum => Builder::Momentum(Box::new(MomentumBlocks::new(settings))),
@@ -79,7 +79,7 @@ impl RowSource {
         }
     }
 
-    /// Noise of the speed so far.
+    /// Returns the noise of the speed so far.
     pub fn noise(&self) -> &SpeedNoise {
         match &self.builder {
             Builder::Momentum(blocks) => blocks.noise(),

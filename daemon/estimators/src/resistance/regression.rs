@@ -66,7 +66,7 @@ pub enum RegressionObservation {
 const OVERLAP: f64 = -0.267_949_192_431_122_7;
 
 impl RegressionObservation {
-    /// True when nothing before it is connected with it.
+    /// Returns whether nothing before it is connected with it.
     pub fn is_first(&self) -> bool {
         match self {
             RegressionObservation::Block(block) => block.is_first,
@@ -74,7 +74,7 @@ impl RegressionObservation {
         }
     }
 
-    /// Time of the newest sample in ns.
+    /// Returns the time of the newest sample in ns.
     pub fn time_ns(&self) -> i64 {
         match self {
             RegressionObservation::Block(block) => block.time_ns,
@@ -82,7 +82,7 @@ impl RegressionObservation {
         }
     }
 
-    /// How the error moves to the first observation of a chain: momentum is new, and the
+    /// Returns how the error moves to the first observation of a chain: momentum is new, and the
     /// disturbance has gone on for `gap_s`; unknown for how long when `None`. A block is used up
     /// by it.
     pub fn restart(
@@ -98,7 +98,7 @@ impl RegressionObservation {
         }
     }
 
-    /// How the error moves from the observation before to this one.
+    /// Returns how the error moves from the observation before to this one.
     pub fn propagation(&self, disturbance: &Disturbance) -> Propagation<STATES, COLUMNS> {
         match self {
             RegressionObservation::Block(block) => {
@@ -158,7 +158,7 @@ pub struct RegressionNoise {
 }
 
 impl RegressionNoise {
-    /// A model without rows, with the penalty `sum of weight * unknown^2`.
+    /// Returns a model without rows, with the penalty `sum of weight * unknown^2`.
     pub fn new(disturbance: Disturbance, penalty: &Unknowns) -> Self {
         RegressionNoise {
             disturbance,
@@ -168,7 +168,7 @@ impl RegressionNoise {
         }
     }
 
-    /// Rows taken in, the forgotten ones in part.
+    /// Returns the rows taken in, the forgotten ones in part.
     pub fn count(&self) -> f64 {
         self.information.count()
     }
@@ -189,7 +189,7 @@ impl RegressionNoise {
         self.whitener.loosen(DISTURBANCE, (std_n_per_kn / root).powi(2));
     }
 
-    /// The row of an observation that the model has moved to; `None` when its variance is not
+    /// Returns the row of an observation that the model has moved to; `None` when its variance is not
     /// sound.
     pub fn row(&self, observation: &RegressionObservation) -> Option<WhiteRow> {
         let row = self.whitener.row(&observation.sighting())?;
@@ -212,7 +212,7 @@ impl RegressionNoise {
         self.count() - FREE
     }
 
-    /// Residual variance of rows of unit variance, the model itself counting for some.
+    /// Returns the residual variance of rows of unit variance, the model itself counting for some.
     pub fn scale(&self) -> f64 {
         let freedom = self.freedom().max(0.0);
         (self.information.residual_sum() + PRIOR_ROWS) / (freedom + PRIOR_ROWS)
@@ -233,7 +233,7 @@ impl RegressionNoise {
         Some(RegressionSolution { estimate, covariance })
     }
 
-    /// Speed and disturbance now, so long after the newest block.
+    /// Returns the speed and disturbance now, so long after the newest block.
     pub fn motion(&self, since: &SinceBlock) -> AffineMotion {
         let duration_s = since.impulse[1];
         let mut to_now = Matrix2::identity();
@@ -256,7 +256,7 @@ impl RegressionNoise {
         }
     }
 
-    /// The disturbance now in N/kN for given unknowns, with its standard deviation.
+    /// Returns the disturbance now in N/kN for given unknowns, with its standard deviation.
     pub fn disturbance_now(&self, unknowns: &Unknowns) -> (f64, f64) {
         let columns = self.whitener.state.row(DISTURBANCE);
         let taken: f64 = (0..UNKNOWNS).map(|i| columns[i + 1] * unknowns[i]).sum();

@@ -3,10 +3,10 @@
 use dynocar_core::filter::bounded_minimum;
 use dynocar_core::pipeline::InnovationMonitor;
 use dynocar_core::pipeline::admission::limits::UNFIT_SHARE;
-use dynocar_core::pipeline::estimator::excitation;
 use dynocar_core::pipeline::judge::StatusInputs;
 use dynocar_core::pipeline::momentum::{PARAMETERS, SPEED_SCALE_MPS, regressors, unscaling};
 use dynocar_core::pipeline::motion::SpeedRange;
+use dynocar_core::pipeline::output::excitation;
 use dynocar_model::train::Davis;
 use dynocar_shared::{Manoeuvre, Reason, Status};
 use nalgebra::{Matrix3, Vector3};
@@ -44,12 +44,12 @@ impl DrivenSpeeds {
         self.count += 1.0;
     }
 
-    /// Highest in m/s; 0 before the first.
+    /// Returns the highest in m/s; 0 before the first.
     pub fn max_mps(&self) -> f64 {
         self.range.get().map_or(0.0, |(_, max_mps)| max_mps)
     }
 
-    /// Mean; 0 before the first.
+    /// Returns the mean; 0 before the first.
     pub fn mean_mps(&self) -> f64 {
         if self.count > 0.0 { self.sum_mps / self.count } else { 0.0 }
     }
@@ -176,7 +176,7 @@ fn case(
     }
 }
 
-/// Which coefficients contribute an error that is small against w0 at the highest driven speed.
+/// Returns which coefficients contribute an error that is small against w0 at the highest driven speed.
 fn excited(covariance: &Matrix3<f64>, w0: f64, speed_mps: f64) -> [bool; PARAMETERS] {
     let powers = regressors(speed_mps.max(0.25 * SPEED_SCALE_MPS));
     std::array::from_fn(|i| covariance[(i, i)].sqrt() * powers[i] < EXCITED_SHARE * w0)

@@ -53,12 +53,12 @@ impl Default for RunScenario {
     }
 }
 
-/// The sum of twelve uniforms: mean 0, variance 1.
+/// Returns the sum of twelve uniforms: mean 0, variance 1.
 pub fn normal(random: &mut ChaCha8Rng) -> f64 {
     (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0
 }
 
-/// Samples of a train with s = 100 N/kN per m/s² under constant driving force, every `step_s`, by small
+/// Returns the samples of a train with s = 100 N/kN per m/s² under constant driving force, every `step_s`, by small
 /// Euler steps.
 pub fn driven(davis: &Davis, speed_mps: f64, driving: f64, step_s: f64) -> Vec<UnitSample> {
     let mut speed_mps = speed_mps;
@@ -85,7 +85,7 @@ pub fn driven(davis: &Davis, speed_mps: f64, driving: f64, step_s: f64) -> Vec<U
 }
 
 impl RunScenario {
-    /// The train as declared: with another resistance than the true one.
+    /// Returns the train as declared: with another resistance than the true one.
     pub fn train(&self) -> Arc<TrainModel> {
         let Davis { a, b, c } = self.davis;
         let resistance = Davis { a: 1.3 * a, b: 0.5 * b, c: 1.1 * c };
@@ -97,7 +97,7 @@ impl RunScenario {
         })
     }
 
-    /// A line of steps of a few ‰.
+    /// Returns a line of steps of a few ‰.
     pub fn track(&self) -> Arc<Track> {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed ^ 0xface);
         let steps: Vec<_> =
@@ -105,7 +105,7 @@ impl RunScenario {
         Arc::new(Track::new("test".into(), None, Some(&steps), None, None).unwrap())
     }
 
-    /// The samples of one run.
+    /// Returns the samples of one run.
     pub fn samples(&self) -> Vec<TrainSample> {
         let (train, track) = (self.train(), self.track());
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
@@ -173,12 +173,12 @@ impl RunScenario {
             .with(SampleField::Position, position_m)
     }
 
-    /// The snapshot after a run, by an estimator as in a configuration file.
+    /// Returns the snapshot after a run, by an estimator as in a configuration file.
     pub fn identify(&self, settings: &str) -> ParameterSnapshot {
         self.identify_samples(settings, &self.samples())
     }
 
-    /// The snapshot after other samples of this scenario's train.
+    /// Returns the snapshot after other samples of this scenario's train.
     pub fn identify_samples(&self, settings: &str, samples: &[TrainSample]) -> ParameterSnapshot {
         let settings: EstimatorSettings = toml::from_str(settings).unwrap();
         let train = self.train();

@@ -35,7 +35,7 @@ pub struct Dynamics {
 }
 
 impl Dynamics {
-    /// Deceleration in m/s² by resistance and gradient, which does not depend on the mass.
+    /// Returns the deceleration in m/s² by resistance and gradient, which does not depend on the mass.
     #[inline]
     pub fn drag_mps2(&self, motion: &KnownMotion, speed_mps: f64) -> f64 {
         self.inertia.mps2_per_n_per_kn() * self.resistance.w_n_per_kn(motion, speed_mps)
@@ -157,7 +157,7 @@ impl BiasBank {
         }
     }
 
-    /// The filter with the most evidence.
+    /// Returns the filter with the most evidence.
     pub fn best(&self) -> &Gaussian<3> {
         &self.behaviours.likeliest().filter
     }
@@ -196,7 +196,7 @@ impl BiasBank {
         self.averaged(|_| true)
     }
 
-    /// The same of those behaviours alone that know of forces which jump between samples.
+    /// Returns the same of those behaviours alone that know of forces which jump between samples.
     pub fn moments_after_a_jump(&self) -> MassBiasMoments {
         self.averaged(BiasModel::knows_of_jumps)
     }
@@ -231,7 +231,7 @@ impl BiasBank {
         }
     }
 
-    /// True while every filter is sound.
+    /// Returns whether every filter is sound.
     pub fn is_sound(&self) -> bool {
         self.behaviours.hypotheses().iter().all(|behaviour| behaviour.filter.is_sound())
             && self.behaviours.weights().iter().all(|weight| weight.is_finite())

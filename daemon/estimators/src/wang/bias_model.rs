@@ -1,4 +1,4 @@
-//! How an acceleration that the model lacks behaves in time.
+//! Models over time of an acceleration that the forces do not explain.
 
 use dynocar_core::pipeline::motion::jump_variance;
 use dynocar_model::track::gradient_error_kept;
@@ -46,38 +46,38 @@ pub struct BiasModel {
 }
 
 impl BiasModel {
-    /// A behaviour.
+    /// Returns a behaviour.
     pub fn new(std_mps2: f64, time_s: f64, grows_with_speed: bool) -> Self {
         BiasModel { std_mps2, time_s, grows_with_speed }
     }
 
-    /// A behaviour that lasts for ever also believes that forces run straight between samples.
+    /// Returns a behaviour that lasts for ever also believes that forces run straight between samples.
     pub fn knows_of_jumps(&self) -> bool {
         self.time_s.is_finite()
     }
 
-    /// Variance in (m/s)² of what a step misses because the acceleration changes by so much over it.
+    /// Returns the variance in (m/s)² of what a step misses because the acceleration changes by so much over it.
     pub fn jump_variance(&self, change_mps2: f64, step_s: f64) -> f64 {
         if self.knows_of_jumps() { jump_variance(change_mps2, step_s) } else { 0.0 }
     }
 
-    /// Share of the bias that is left after a time in s.
+    /// Returns the share of the bias that is left after a time in s.
     pub fn keep(&self, step_s: f64) -> f64 {
         (-step_s / self.time_s).exp()
     }
 
-    /// Variance in (m/s²)² of what comes to the bias while a share of it stays.
+    /// Returns the variance in (m/s²)² of what comes to the bias while a share of it stays.
     pub fn noise_variance(&self, keep: f64) -> f64 {
         self.std_mps2 * self.std_mps2 * (1.0 - keep * keep)
     }
 
-    /// Standard deviation of the bias where nothing is known of it, in addition to a map's error of a standard
-    /// deviation in m/s² at a speed in m/s.
+    /// Returns the standard deviation of the bias where nothing is known of it, in addition to a map's error of a
+    /// standard deviation in m/s² at a speed in m/s.
     pub fn std_given_others_mps2(&self, map_std_mps2: f64, speed_mps: f64) -> f64 {
         self.std_mps2.hypot(self.of_map(map_std_mps2, speed_mps))
     }
 
-    /// Share of the bias that stays over a step and the variance of what comes to it, where a share
+    /// Returns the share of the bias that stays over a step and the variance of what comes to it, where a share
     /// `keep` of it would stay but for the map's error.
     ///
     /// Bias and error are one process here: its variance is the sum of the two, its correlation over the
@@ -92,7 +92,7 @@ impl BiasModel {
         (keep, both * (1.0 - keep * keep))
     }
 
-    /// The map's error in units of the bias, which may be stated at another speed.
+    /// Returns the map's error in units of the bias, which may be stated at another speed.
     fn of_map(&self, map_std_mps2: f64, speed_mps: f64) -> f64 {
         map_std_mps2 / self.shape(speed_mps).max(SHAPE_MIN)
     }

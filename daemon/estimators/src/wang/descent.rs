@@ -30,14 +30,14 @@ impl<const N: usize> MeanSquare<N> {
         self.count += 1.0;
     }
 
-    /// The mean square at some coefficients; 0 without samples.
+    /// Returns the mean square at some coefficients; 0 without samples.
     pub fn loss(&self, coefficients: &SVector<f64, N>) -> f64 {
         let sum = self.squares - 2.0 * coefficients.dot(&self.moment)
             + coefficients.dot(&(self.gram * coefficients));
         sum / self.count.max(1.0)
     }
 
-    /// Its gradient (Wang 2022 trains on eq. 27 with it); 0 without samples.
+    /// Returns its gradient (Wang 2022 trains on eq. 27 with it); 0 without samples.
     pub fn gradient(&self, coefficients: &SVector<f64, N>) -> SVector<f64, N> {
         (self.gram * coefficients - self.moment) * (2.0 / self.count.max(1.0))
     }
@@ -56,7 +56,7 @@ impl<const N: usize> MeanSquare<N> {
         }
     }
 
-    /// Covariance of the minimum by the textbook formula, which takes residuals for white.
+    /// Returns the covariance of the minimum by the textbook formula, which takes residuals for white.
     ///
     /// `None` while the samples do not determine the coefficients.
     pub fn covariance(&self, coefficients: &SVector<f64, N>) -> Option<SMatrix<f64, N, N>> {
@@ -70,7 +70,7 @@ impl<const N: usize> MeanSquare<N> {
 }
 
 impl MeanSquare<1> {
-    /// Share of the target's squares that the one feature explains at best, from 0 to 1.
+    /// Returns the share of the target's squares that the one feature explains at best, from 0 to 1.
     pub fn explained_share(&self) -> f64 {
         let product = self.gram[(0, 0)] * self.squares;
         if product > 0.0 { (self.moment[0].powi(2) / product).min(1.0) } else { 0.0 }

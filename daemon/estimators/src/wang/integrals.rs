@@ -56,7 +56,7 @@ impl Regressors {
         }
     }
 
-    /// How fast the integrals grow.
+    /// Returns how fast the integrals grow.
     pub fn rates(&self, motion: &KnownMotion) -> Integrals {
         let unit_mps2 = self.inertia.mps2_per_n_per_kn();
         let phi = self.basis.at(motion.speed_mps) * unit_mps2;
@@ -106,7 +106,7 @@ impl Integrals {
         [to.tied_mps - from.tied_mps, to.row[INVERSE_MASS] - from.row[INVERSE_MASS]]
     }
 
-    /// The equation of a measured speed: row and value.
+    /// Returns the equation of a measured speed: row and value.
     pub fn equation(&self, speed_mps: f64) -> (RegressorRow, f64) {
         let mut row = self.row;
         row[LEVEL] = 1.0;
@@ -151,7 +151,7 @@ pub struct BiasHypothesis {
 }
 
 impl BiasHypothesis {
-    /// A regression that starts from prior knowledge.
+    /// Returns a regression that starts from prior knowledge.
     pub fn new(model: BiasModel, mean: &RegressorRow, std: &RegressorRow) -> Self {
         let mut regression = DriftingLevel::new(mean, std);
         regression.restart_bias(model.std_mps2);

@@ -59,7 +59,7 @@ pub struct JointLeastSquares {
 }
 
 impl JointLeastSquares {
-    /// An estimator for a train.
+    /// Returns an estimator for a train.
     ///
     /// # Errors
     ///
@@ -112,7 +112,7 @@ impl JointLeastSquares {
         })
     }
 
-    /// Covariance of [a, b, c] of one polynomial; `None` when the regression is not sound.
+    /// Returns the covariance of [a, b, c] of one polynomial; `None` when the regression is not sound.
     pub fn resistance_covariance(&self, section: LearningSet) -> Option<Matrix3<f64>> {
         let places = [0, 1, 2].map(|i| POLYNOMIALS[section as usize] + i);
         let own = self.covariance(&self.covariance_root()?, places);
@@ -120,7 +120,7 @@ impl JointLeastSquares {
         Some(to_davis * own * to_davis.transpose())
     }
 
-    /// Mass in kg and its standard deviation; `None` when the regression is not sound.
+    /// Returns the mass in kg and its standard deviation; `None` when the regression is not sound.
     pub fn mass_kg(&self) -> Option<(f64, f64)> {
         let inverse = self.bank.likeliest().regression.solve()?[INVERSE_MASS];
         let std = self.covariance_root()?.row(INVERSE_MASS).norm();
@@ -128,7 +128,7 @@ impl JointLeastSquares {
         Some((mass_kg, mass_kg / inverse * std))
     }
 
-    /// Standard deviation of the measured speed in m/s, as learned.
+    /// Returns the standard deviation of the measured speed in m/s, as learned.
     pub fn speed_noise_mps(&self) -> f64 {
         self.noise.variance().sqrt()
     }
@@ -228,7 +228,7 @@ impl JointLeastSquares {
         self.last = Some((expected, rates));
     }
 
-    /// A step with what comes to the level in addition to the bias: what the trapezoid misses, and what
+    /// Returns a step with what comes to the level in addition to the bias: what the trapezoid misses, and what
     /// the noise of the speed does in the features. There it moves the resistance, and with it
     /// the integral, by a random walk.
     fn step(
@@ -347,7 +347,7 @@ settings! {
 }
 
 impl JointLeastSquaresSettings {
-    /// The behaviours of the unexplained acceleration: none; slow in proportion to speed; small
+    /// Returns the behaviours of the unexplained acceleration: none; slow in proportion to speed; small
     /// and large, each slow and gusty. A constant is z1's to explain, so that 'none' stays far
     /// below what a leg measures of an acceleration, 1e-5 m/s²: otherwise every leg would have a
     /// constant of its own, and what the legs show together would count as less than it is.

@@ -1,10 +1,10 @@
 //! Contents of a snapshot by [`JointLeastSquares`].
 
 use dynocar_core::filter::drifting_level::BIAS;
-use dynocar_core::pipeline::estimator::{
+use dynocar_core::pipeline::judge::{InputState, StatusInputs};
+use dynocar_core::pipeline::output::{
     DAVIS_AND_MASS, excitation, write_innovations, write_parameters,
 };
-use dynocar_core::pipeline::judge::{InputState, StatusInputs};
 use dynocar_shared::{ParameterSnapshot, Reason, Status};
 use nalgebra::{Matrix4, SMatrix, Vector3, Vector4};
 
@@ -93,7 +93,7 @@ impl JointLeastSquares {
         own[(3, 3)].sqrt() / inverse.abs()
     }
 
-    /// Standard deviations of the basic resistance in N/kN at low, middle and high speed.
+    /// Returns the standard deviations of the basic resistance in N/kN at low, middle and high speed.
     fn resistance_stds(&self, root: &SMatrix<f64, UNKNOWNS, UNKNOWNS>) -> [f64; 3] {
         let first = POLYNOMIALS[LearningSet::Basic as usize];
         let own = self.covariance(root, [first, first + 1, first + 2]);

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use dynocar_core::pipeline::estimator::{write_innovations, write_parameters};
 use dynocar_core::pipeline::judge::{InputState, Judgement, StatusInputs};
 use dynocar_core::pipeline::motion::{SpeedNoise, SpeedRange, StopWatch, jump_variance};
+use dynocar_core::pipeline::output::{write_innovations, write_parameters};
 use dynocar_core::pipeline::settings::SettingError;
 use dynocar_core::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
 use dynocar_model::force::ResolvedSample;
@@ -63,7 +63,7 @@ pub struct MassKalman {
 }
 
 impl MassKalman {
-    /// An estimator for a train.
+    /// Returns an estimator for a train.
     ///
     /// # Errors
     ///
@@ -102,14 +102,14 @@ impl MassKalman {
         })
     }
 
-    /// Mass in kg and its standard deviation, as known when force last acted.
+    /// Returns the mass in kg and its standard deviation, as known when force last acted.
     pub fn mass_kg(&self) -> (f64, f64) {
         let inverse = self.moments.inverse_mass;
         let mass_kg = self.inertia.reference_mass_kg / inverse;
         (mass_kg, mass_kg / inverse * self.moments.inverse_mass_variance.sqrt())
     }
 
-    /// Standard deviation of the measured speed in m/s, as learned.
+    /// Returns the standard deviation of the measured speed in m/s, as learned.
     pub fn speed_noise_mps(&self) -> f64 {
         self.noise.variance().sqrt()
     }
@@ -332,7 +332,7 @@ impl Settling {
         self.impulse_mps += 0.5 * step_s * (from_mps2 + to_mps2).abs();
     }
 
-    /// True when what a jump left open is small against what the force has done since.
+    /// Returns whether what a jump left open is small against what the force has done since.
     pub fn is_settled(&self) -> bool {
         self.impulse_mps >= IMPULSE_MIN * self.jump_mps
     }

@@ -61,7 +61,7 @@ impl MassKalmanSettings {
         Ok(())
     }
 
-    /// The resistance that the filters use.
+    /// Returns the resistance that the filters use.
     pub fn line_resistance(&self, train: &TrainModel) -> LineResistance {
         let davis = |[a, b, c]: [f64; 3]| Davis { a, b, c };
         LineResistance {
@@ -83,7 +83,7 @@ impl MassKalmanSettings {
         self
     }
 
-    /// The behaviours of the bias: none; constant; constant and slow in proportion to speed;
+    /// Returns the behaviours of the bias: none; constant; constant and slow in proportion to speed;
     /// small and large, each slow and gusty.
     pub fn bias_models(&self) -> [BiasModel; MODELS] {
         let model =

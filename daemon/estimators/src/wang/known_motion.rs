@@ -34,7 +34,7 @@ pub struct KnownMotion {
 }
 
 impl KnownMotion {
-    /// The motion at a sample.
+    /// Returns the motion at a sample.
     ///
     /// # Errors
     ///
@@ -96,7 +96,7 @@ impl KnownMotion {
         })
     }
 
-    /// Time in s since an earlier sample of the same motion segment; `None` when forces and speed
+    /// Returns the time in s since an earlier sample of the same motion segment; `None` when forces and speed
     /// between the two are not known well enough to integrate.
     pub fn step_from(&self, earlier: &KnownMotion) -> Option<f64> {
         let step_s = self.time_ns.saturating_sub(earlier.time_ns) as f64 * 1e-9;
@@ -115,13 +115,13 @@ pub struct Inertia {
 }
 
 impl Inertia {
-    /// That of a train.
+    /// Returns that of a train.
     pub fn of(train: &TrainModel) -> Self {
         let TrainModel { mass_kg, rotating_mass_factor, .. } = *train;
         Inertia { reference_mass_kg: mass_kg, rotating_mass_factor }
     }
 
-    /// Acceleration in m/s² of the force on the reference mass.
+    /// Returns the acceleration in m/s² of the force on the reference mass.
     #[inline]
     pub fn push_mps2(&self, motion: &KnownMotion) -> f64 {
         motion.force_n / self.inertial_mass_kg(self.reference_mass_kg)
@@ -133,7 +133,7 @@ impl Inertia {
         force::mps2_per_n_per_kn(self.rotating_mass_factor)
     }
 
-    /// Mass in kg that a force accelerates when the train has a mass in kg.
+    /// Returns the mass in kg that a force accelerates when the train has a mass in kg.
     #[inline]
     pub fn inertial_mass_kg(&self, mass_kg: f64) -> f64 {
         rotating::inertial_mass_kg(mass_kg, self.rotating_mass_factor)
@@ -158,7 +158,7 @@ impl LearningSet {
     /// Every section, in the order of its number.
     pub const ALL: [LearningSet; 3] = [LearningSet::Basic, LearningSet::Curve, LearningSet::Tunnel];
 
-    /// The set of a step between two samples.
+    /// Returns the set of a step between two samples.
     ///
     /// As in Algorithm 1, a step in a curve inside a tunnel belongs to the curve set. A train has
     /// a length, which the paper's mass point lacks: steps while a part of it is inside belong to

@@ -35,7 +35,7 @@ impl LineResistance {
         }
     }
 
-    /// All that retards in N/kN at a speed in m/s: this resistance plus what is known.
+    /// Returns all that retards in N/kN at a speed in m/s: this resistance plus what is known.
     #[inline]
     pub fn w_n_per_kn(&self, motion: &KnownMotion, speed_mps: f64) -> f64 {
         let curve = self.curve.map_or(0.0, |curve| {
@@ -73,12 +73,12 @@ pub struct SpeedBasis {
 }
 
 impl SpeedBasis {
-    /// A basis over speeds from 0 to `scale_mps`.
+    /// Returns a basis over speeds from 0 to `scale_mps`.
     pub fn new(scale_mps: f64) -> Self {
         SpeedBasis { scale_mps }
     }
 
-    /// The three polynomials at a speed in m/s.
+    /// Returns the three polynomials at a speed in m/s.
     pub fn at(&self, speed_mps: f64) -> Vector3<f64> {
         let x = speed_mps / self.scale_mps;
         Vector3::new(
@@ -88,7 +88,7 @@ impl SpeedBasis {
         )
     }
 
-    /// The matrix from coefficients in this basis to [a, b, c].
+    /// Returns the matrix from coefficients in this basis to [a, b, c].
     pub fn to_davis_matrix(&self) -> Matrix3<f64> {
         let (second, third, scale) = (3.0_f64.sqrt(), 5.0_f64.sqrt(), self.scale_mps);
         Matrix3::new(
@@ -104,13 +104,13 @@ impl SpeedBasis {
         )
     }
 
-    /// Coefficients in this basis to a polynomial of speed.
+    /// Returns the coefficients in this basis to a polynomial of speed.
     pub fn to_davis(&self, coefficients: &Vector3<f64>) -> Davis {
         let [a, b, c] = (self.to_davis_matrix() * coefficients).into();
         Davis { a, b, c }
     }
 
-    /// A polynomial of speed to coefficients in this basis.
+    /// Returns a polynomial of speed to coefficients in this basis.
     pub fn of_davis(&self, davis: &Davis) -> Vector3<f64> {
         let (second, third, scale) = (3.0_f64.sqrt(), 5.0_f64.sqrt(), self.scale_mps);
         let quadratic = davis.c * scale * scale / (6.0 * third);

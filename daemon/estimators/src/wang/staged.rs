@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use dynocar_core::pipeline::estimator::{DAVIS_AND_MASS, write_parameters};
 use dynocar_core::pipeline::judge::{InputState, Judgement, StatusInputs};
 use dynocar_core::pipeline::motion::{MOVING_MPS, SpeedRange, StopWatch};
+use dynocar_core::pipeline::output::{DAVIS_AND_MASS, write_parameters};
 use dynocar_core::pipeline::settings::SettingError;
 use dynocar_core::pipeline::{Estimator, Outcome};
 use dynocar_core::settings;
@@ -64,7 +64,7 @@ pub struct StagedDescent {
 }
 
 impl StagedDescent {
-    /// An estimator for a train.
+    /// Returns an estimator for a train.
     ///
     /// # Errors
     ///
@@ -114,7 +114,7 @@ impl StagedDescent {
         self.learned = self.settings.resistance_samples;
     }
 
-    /// Mass in kg; the declared one before the last stage.
+    /// Returns the mass in kg; the declared one before the last stage.
     pub fn mass_kg(&self) -> f64 {
         match self.settings.mass_regression {
             MassRegression::ForceOnAcceleration => {
@@ -205,7 +205,7 @@ impl StagedDescent {
 }
 
 impl StagedDescent {
-    /// Standard deviation of the mass in kg by the textbook formula.
+    /// Returns the standard deviation of the mass in kg by the textbook formula.
     fn mass_std_kg(&self) -> Option<f64> {
         if self.mass.sums.count < MASS_SAMPLES_MIN {
             return None;
@@ -214,7 +214,7 @@ impl StagedDescent {
         Some(self.mass_kg() * variance.sqrt() / self.mass.coefficients[0].abs())
     }
 
-    /// How far the regression of force on acceleration and its reverse lie apart, as a share of
+    /// Returns how far the regression of force on acceleration and its reverse lie apart, as a share of
     /// the mass.
     ///
     /// Either is biased by the noise of its regressor, in opposite directions, so that the true

@@ -73,7 +73,7 @@ mod tests {
     const TRUTH: Davis = Davis { a: 0.79, b: 0.0229, c: 0.001493 };
     const SCALES: [f64; 3] = [1.0, 0.02, 0.001];
 
-    /// Traction, coasting and braking over hills; the measured speeds carry a wave as noise.
+    /// Returns the traction, coasting and braking over hills; the measured speeds carry a wave as noise.
     fn example() -> (Vec<TrajectoryStep>, Vec<f64>) {
         let gain = mps2_per_n_per_kn(0.06);
         let steps: Vec<TrajectoryStep> = (0..60)

@@ -1,9 +1,9 @@
 //! `trajectory_newton`: a trajectory fit over a sliding window, the online scheme of Xia 2023.
 
 use dynocar_core::filter::levenberg_marquardt::ParameterBox;
-use dynocar_core::pipeline::estimator::{DAVIS, write_parameters};
 use dynocar_core::pipeline::judge::{InputState, Judgement};
 use dynocar_core::pipeline::motion::SpeedRange;
+use dynocar_core::pipeline::output::{DAVIS, write_parameters};
 use dynocar_core::pipeline::settings::{SettingError, require};
 use dynocar_core::pipeline::{Estimator, InnovationMonitor, Outcome};
 use dynocar_core::settings;
@@ -67,7 +67,7 @@ pub struct TrajectoryNewton {
 }
 
 impl TrajectoryNewton {
-    /// An estimator for a train.
+    /// Returns an estimator for a train.
     ///
     /// # Errors
     ///
@@ -335,7 +335,7 @@ settings! {
 }
 
 impl TrajectoryNewtonSettings {
-    /// Bounds and prior for a train.
+    /// Returns the bounds and prior for a train.
     ///
     /// # Errors
     ///
@@ -360,7 +360,7 @@ impl TrajectoryNewtonSettings {
         Ok((bounds, DavisPrior { davis, std }))
     }
 
-    /// Root of the density of the disturbance in m/s² √s.
+    /// Returns the root of the density of the disturbance in m/s² √s.
     pub(crate) fn disturbance_mps2(&self, train: &TrainModel) -> f64 {
         match self.method {
             FitMethod::LevenbergMarquardt => {

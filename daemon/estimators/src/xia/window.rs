@@ -102,7 +102,7 @@ impl StepWindow {
         true
     }
 
-    /// Variance in (m/s)² that the steps miss for each second because forces jump.
+    /// Returns the variance in (m/s)² that the steps miss for each second because forces jump.
     pub fn missed_density(&self) -> f64 {
         let sum =
             |(time, variance): (f64, f64), step: &(f64, f64)| (time + step.0, variance + step.1);
@@ -115,7 +115,7 @@ impl StepWindow {
         self.steps.len()
     }
 
-    /// The window as a segment.
+    /// Returns the window as a segment.
     pub fn segment(&self) -> MotionSegment<'_> {
         MotionSegment { steps: &self.steps, speeds_mps: &self.speeds_mps }
     }

@@ -51,7 +51,7 @@ pub struct NewtonSettings {
 }
 
 impl NewtonSettings {
-    /// The values of Table 2; restarts as the text has them.
+    /// Returns the values of Table 2; restarts as the text has them.
     pub fn of_the_paper() -> Self {
         NewtonSettings {
             bounds: ParameterBox {
@@ -89,7 +89,7 @@ pub struct NewtonResult {
 pub struct RestartSource(u64);
 
 impl RestartSource {
-    /// A source that gives the same restarts for the same seed.
+    /// Returns a source that gives the same restarts for the same seed.
     pub fn new(seed: u64) -> Self {
         RestartSource(seed)
     }

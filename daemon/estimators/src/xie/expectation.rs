@@ -1,5 +1,4 @@
-//! The E-step: what the states of a window look like under a value of the coefficient, and what it
-//! gives the M-step.
+//! The E-step: the distribution of a window's states under a value of the coefficient, and its moments for the M-step.
 
 use std::f64::consts::LOG2_E;
 
@@ -13,14 +12,14 @@ use nalgebra::{SMatrix, SVector};
 
 /// A way to take the expectation.
 pub trait Expectation: Send {
-    /// Gradient and curvature of Q at the model's share.
+    /// Returns the gradient and curvature of Q at the model's share.
     ///
     /// # Errors
     ///
     /// When no particle is left, or a factorisation fails.
     fn expect(&mut self, model: &WindowModel<'_>) -> Option<Statistics>;
 
-    /// The belief about the state of a step before its measurement, from the last E-step.
+    /// Returns the belief about the state of a step before its measurement, from the last E-step.
     fn predicted(&self, step: usize) -> Option<Gaussian<2>>;
 }
 
@@ -204,7 +203,7 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// The step to the maximum: Q is quadratic in the share, so that the papers' gradient
+    /// Returns the step to the maximum: Q is quadratic in the share, so that the papers' gradient
     /// search (Xie 2019, eq. 33; Jin 2020, eq. 29) ends after this one step. 0 where Q does not
     /// depend on the coefficient.
     pub fn newton_step(&self) -> f64 {
@@ -235,7 +234,7 @@ pub struct MoveNoise {
 }
 
 impl MoveNoise {
-    /// The noise of a step; of no step, nothing that could be divided by zero.
+    /// Returns the noise of a step; of no step, nothing that could be divided by zero.
     pub fn over(noise: &MotionNoise, step_s: f64) -> Self {
         let variances = [noise.distance_m2_per_s, noise.speed_m2_per_s3].map(|rate| rate * step_s);
         let precisions =
@@ -270,7 +269,7 @@ pub struct WindowModel<'a> {
 }
 
 impl WindowModel<'_> {
-    /// The share that acts, and its derivative by the share: above 1 the printed cap lets the
+    /// Returns the share that acts, and its derivative by the share: above 1 the printed cap lets the
     /// demand act, whatever the share.
     pub fn acting(&self) -> (f64, f64) {
         if self.has_printed_cap && self.share >= 1.0 { (1.0, 0.0) } else { (self.share, 1.0) }
@@ -295,14 +294,14 @@ impl WindowModel<'_> {
         }
     }
 
-    /// Derivatives of distance and speed after a move by the share.
+    /// Returns the derivatives of distance and speed after a move by the share.
     pub fn by_share(&self, step: usize) -> [f64; 2] {
         let inputs = &self.window.entries[step + 1].inputs;
         let speed = -inputs.step_s * inputs.gain_mps2 * inputs.demand * self.acting().1;
         [0.5 * inputs.step_s * speed, speed]
     }
 
-    /// The process noise of the move that starts at `step`.
+    /// Returns the process noise of the move that starts at `step`.
     pub fn move_noise(&self, step: usize) -> &MoveNoise {
         &self.window.entries[step + 1].noise
     }

@@ -6,7 +6,7 @@ use dynocar_core::pipeline::braking::engine::{
     BrakingEstimate, BrakingObservation, Engine, EngineStep,
 };
 use dynocar_core::pipeline::braking::intake::BrakingCoefficient;
-use dynocar_core::pipeline::braking::law_bank::BrakingLaw;
+use dynocar_core::pipeline::braking::law::BrakingLaw;
 use dynocar_core::pipeline::braking::motion::{MotionNoise, SCALE, StepInputs, Walk};
 use dynocar_core::pipeline::braking::settings::{BrakeFactor, BrakingSettings};
 use dynocar_core::pipeline::braking::tracker::{PriorScale, TrackerModel, measure};
@@ -111,7 +111,7 @@ pub struct EmWindow<E> {
 }
 
 impl<E: Expectation> EmWindow<E> {
-    /// An estimator with an E-step made for windows of `settings.window`.
+    /// Returns an estimator with an E-step made for windows of `settings.window`.
     pub fn new(settings: EmSettings, noise: MotionNoise, expectation: E) -> Self {
         let first = Gaussian { mean: SVector::zeros(), covariance: SMatrix::zeros() };
         EmWindow {
@@ -167,7 +167,7 @@ impl<E: Expectation> EmWindow<E> {
         Some(())
     }
 
-    /// Variance of the share given the window alone, by a Kalman filter in which it is
+    /// Returns the variance of the share given the window alone, by a Kalman filter in which it is
     /// constant and unknown beforehand.
     fn information_variance(&self) -> Option<f64> {
         let scale = Uncertain::new(self.share, 10.0);

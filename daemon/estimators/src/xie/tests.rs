@@ -3,7 +3,7 @@
 use dynocar_core::filter::Gaussian;
 use dynocar_core::filter::random::Random;
 use dynocar_core::pipeline::braking::engine::{BrakingObservation, Engine, EngineStep};
-use dynocar_core::pipeline::braking::law_bank::BrakingLaw;
+use dynocar_core::pipeline::braking::law::BrakingLaw;
 use dynocar_core::pipeline::braking::motion::{self, MotionNoise, StepInputs, Walk};
 use dynocar_core::pipeline::braking::settings::BrakingSettings;
 use dynocar_core::pipeline::braking::tracker::{PriorScale, Tracker, TrackerModel};
@@ -34,7 +34,7 @@ fn inputs() -> StepInputs {
     }
 }
 
-/// Measured distances of a braking with a constant coefficient.
+/// Returns the measured distances of a braking with a constant coefficient.
 fn observed(seed: u64) -> Vec<BrakingObservation> {
     let mut random = Random::new(seed);
     let (mut distance_m, mut speed_mps) = (0.0, FIRST_MPS);
@@ -78,7 +78,7 @@ fn window(seed: u64) -> ObservedWindow {
     ObservedWindow { entries, first }
 }
 
-/// The estimate after one window.
+/// Returns the estimate after one window.
 fn estimate<E: Expectation>(model: EmSettings, expectation: E, seed: u64) -> Uncertain {
     let mut em = EmWindow::new(model, NOISE, expectation);
     let observed = observed(seed);

@@ -1,4 +1,4 @@
-//! The FMI standard 2.0's types, what an `fmi2Component` points to, and the wall that panics do not pass.
+//! The FMI standard 2.0's types, the target of an `fmi2Component`, and the barrier that panics do not pass.
 
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -13,7 +13,7 @@ pub struct Instance {
 }
 
 impl Instance {
-    /// An instance on the heap, for the simulator to hold.
+    /// Returns an instance on the heap, for the simulator to hold.
     pub(super) fn hand_out(model: Model, log: Log) -> Component {
         Box::into_raw(Box::new(Instance { model, log })).cast()
     }
@@ -27,7 +27,7 @@ pub(super) struct Log {
 }
 
 impl Log {
-    /// The log of an instance by name and callbacks.
+    /// Returns the log of an instance by name and callbacks.
     pub(super) fn new(name: &CStr, callbacks: &CallbackFunctions) -> Self {
         let CallbackFunctions { logger, component_environment: environment, .. } = *callbacks;
         Log { name: name.into(), logger, environment }
@@ -103,7 +103,7 @@ pub(super) unsafe fn take_back(component: Component) {
     }
 }
 
-/// The text behind a pointer, `None` for NULL.
+/// Returns the text behind a pointer, `None` for NULL.
 ///
 /// # Safety
 ///

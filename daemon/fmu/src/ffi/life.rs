@@ -1,4 +1,4 @@
-//! From instantiation to the end, and the steps between.
+//! The life of an instance, from instantiation over its steps to its end.
 //!
 //! Functions of the standard that `modelDescription.xml` does not promise: there, so that every
 //! simulator can load the library, and answered with an error in words.

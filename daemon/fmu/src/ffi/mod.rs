@@ -6,8 +6,8 @@
 //!
 //! # Layout
 //!
-//! - [`instance`]: the standard's types, what an `fmi2Component` points to, and the wall that panics do not pass
-//! - [`life`]: from instantiation to the end, the steps between, and what the description does not promise
+//! - [`instance`]: the standard's types, the target of an `fmi2Component`, and the barrier that panics do not pass
+//! - [`life`]: from instantiation to the end, the steps between, and functions that the description does not promise
 //! - [`values`]: setting and getting variables
 //!
 //! # Safety

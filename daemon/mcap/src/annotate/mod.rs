@@ -86,7 +86,7 @@ pub fn annotate(
     Ok(added)
 }
 
-/// The train and its runs.
+/// Returns the train and its runs.
 fn runs_of(
     moments: &SampleMoments,
     train: Option<u64>,
@@ -240,12 +240,12 @@ impl Visitor for SampleMoments {
 }
 
 impl SampleMoments {
-    /// The trains that there are samples of, in order.
+    /// Returns the trains that there are samples of, in order.
     pub fn trains(&self) -> Vec<u64> {
         trains_of(self.samples.iter().map(|it| it.train))
     }
 
-    /// The runs of a train.
+    /// Returns the runs of a train.
     pub fn runs(&self, train: u64) -> Vec<RunMoments> {
         let samples: Vec<Moment> =
             self.samples.iter().filter(|it| it.train == train).copied().collect();

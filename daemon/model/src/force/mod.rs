@@ -10,7 +10,7 @@
 //!
 //! with the gradient in ‰ and the means taken along the train. [`ForceResolver`] gives
 //! everything but w0(v), which is the quantity that estimators look for; [`ForceBalance::acceleration_mps2`] gives the acceleration.
-//! Each part is a law of [`crate::terms`], with what is declared of it in the train and the line.
+//! Each part is a law of [`crate::terms`], with its declared numbers in the train and the line.
 
 mod resolver;
 
@@ -18,7 +18,7 @@ use super::terms::rotating;
 use super::train::TrainModel;
 pub use resolver::{ForceResolver, ResolvedSample, ValidSample};
 
-/// Acceleration in m/s² that 1 N/kN of resistance takes away, or 1 ‰ of climbing.
+/// Returns the acceleration in m/s² that 1 N/kN of resistance takes away, or 1 ‰ of climbing.
 #[inline]
 pub fn mps2_per_n_per_kn(rotating_mass_factor: f64) -> f64 {
     TrainModel::weight_kn(1.0) / (1.0 + rotating_mass_factor)
@@ -40,7 +40,7 @@ pub struct ForceBalance {
 }
 
 impl ForceBalance {
-    /// The acceleration in m/s² as p0 + p1 v + p2 v² of the speed in m/s.
+    /// Returns the acceleration in m/s² as p0 + p1 v + p2 v² of the speed in m/s.
     #[inline]
     pub fn acceleration_mps2(&self) -> [f64; 3] {
         let per_kg = 1.0 / rotating::inertial_mass_kg(self.mass_kg, self.rotating_mass_factor);

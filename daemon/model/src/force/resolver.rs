@@ -1,4 +1,4 @@
-//! From a valid sample to the known forces on the train.
+//! The known forces on the train at a valid sample.
 
 use std::sync::Arc;
 
@@ -29,7 +29,7 @@ pub struct ValidSample<'a> {
 }
 
 impl ValidSample<'_> {
-    /// True while the controller's wheel-slide protection is active.
+    /// Returns whether the controller's wheel-slide protection is active.
     pub fn is_sliding(&self) -> bool {
         self.sample.flags & FLAG_WHEEL_SLIDE != 0
     }
@@ -87,7 +87,7 @@ pub struct ResolvedSample {
 }
 
 impl ResolvedSample {
-    /// Traction minus brake in N; `None` while either is not measured.
+    /// Returns the traction minus brake in N; `None` while either is not measured.
     #[inline]
     pub fn control_force_n(&self) -> Option<f64> {
         Some(self.traction_force_n? - self.brake_force_n?)
@@ -112,7 +112,7 @@ impl ResolvedSample {
         }
     }
 
-    /// Everything known that retards the train in proportion to its weight, in N/kN: gradient
+    /// Returns everything known that retards the train in proportion to its weight, in N/kN: gradient
     /// and every declared resistance beyond the basic one; `None` while no gradient is known.
     ///
     /// An estimator looks for the part of the motion beyond this sum.
@@ -121,14 +121,14 @@ impl ResolvedSample {
         Some(self.gradient_permille? + self.extra_n_per_kn)
     }
 
-    /// Everything that drives the train but its basic resistance, in N: traction minus brake
+    /// Returns everything that drives the train but its basic resistance, in N: traction minus brake
     /// minus all that is known to retard it.
     #[inline]
     pub fn driving_force_n(&self) -> Option<f64> {
         Some(self.control_force_n()? - self.weight_kn * self.known_n_per_kn()?)
     }
 
-    /// A train of 100 t with gamma 0.06 that coasts on the level at 20 m/s: what tests start from.
+    /// Returns a train of 100 t with gamma 0.06 that coasts on the level at 20 m/s: what tests start from.
     pub fn coasting() -> Self {
         ResolvedSample {
             time_ns: 0,
@@ -189,7 +189,7 @@ pub struct ForceResolver {
 }
 
 impl ForceResolver {
-    /// A resolver for one train on one line; without a line the gradient comes from the sample.
+    /// Returns a resolver for one train on one line; without a line the gradient comes from the sample.
     pub fn new(train: Arc<TrainModel>, track: Option<Arc<Track>>) -> Self {
         let Corrections { actuator_delay_s, actuator_lag_s, speed_delay_s, speed_lag_s, .. } =
             train.corrections;
@@ -210,7 +210,7 @@ impl ForceResolver {
         }
     }
 
-    /// The known forces at a sample.
+    /// Returns the known forces at a sample.
     ///
     /// The gradient is the track's at the train's position, else the sample's own, else the
     /// accelerometer's specific force minus dv/dt over the last step, else unknown.
@@ -299,7 +299,7 @@ impl ForceResolver {
         }
     }
 
-    /// Every declared term of resistance at a sample; what c and w0 scale is left open.
+    /// Returns every declared term of resistance at a sample; what c and w0 scale is left open.
     fn declared_resistance(&self, sample: &ResolvedSample) -> Resistance {
         let train = &*self.train;
         let known = &train.corrections;
@@ -336,7 +336,7 @@ impl ForceResolver {
         resistance
     }
 
-    /// Gradient in ‰ along the travel by the track at the sample's position, else by the sample.
+    /// Returns the gradient in ‰ along the travel by the track at the sample's position, else by the sample.
     ///
     /// # Real-time
     ///
@@ -350,7 +350,7 @@ impl ForceResolver {
         on_track().or_else(|| Some(direction * sample.get(SampleField::Gradient)?))
     }
 
-    /// Gradient in ‰ along the travel from specific force = dv/dt + g * gradient, with dv/dt
+    /// Returns the gradient in ‰ along the travel from specific force = dv/dt + g * gradient, with dv/dt
     /// over the last step; its noise telescopes away when it is integrated.
     fn accelerometer_gradient_permille(&mut self, valid: &ValidSample) -> Option<f64> {
         let felt_mps2 = valid.sample.get(SampleField::SpecificForce);

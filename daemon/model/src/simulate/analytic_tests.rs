@@ -10,7 +10,7 @@ use crate::train::Davis;
 
 const DAVIS: Davis = Davis { a: 1.5, b: 0.02, c: 0.004 };
 
-/// Speed after coasting for `time_s` from `start_mps`: the Riccati equation
+/// Returns the speed after coasting for `time_s` from `start_mps`: the Riccati equation
 /// dv/dt = -(p + q v + r v²) with 4 p r > q² has v = (w tan(phi0 - w t / 2) - q) / (2 r), where
 /// w = sqrt(4 p r - q²) and tan(phi0) = (2 r v0 + q) / w.
 fn coasted_speed_mps(davis: Davis, gradient_permille: f64, start_mps: f64, time_s: f64) -> f64 {

@@ -14,7 +14,7 @@ fn predict(recording: &OpenLoopRecording, restart: Restart) -> Prediction {
     prediction
 }
 
-/// A run that the declared model predicts exactly, at 5 Hz.
+/// Returns a run that the declared model predicts exactly, at 5 Hz.
 fn perfect_run(count: usize) -> Vec<ResolvedSample> {
     let pulled = |k: usize| ResolvedSample {
         traction_force_n: Some(30e3 + 20e3 * (k as f64 * 0.01).sin()),

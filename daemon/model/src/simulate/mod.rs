@@ -1,4 +1,4 @@
-//! The forward simulation of a train: what speed a force model predicts.
+//! The forward simulation of a train: the speed that a force model predicts.
 //!
 //! ```text
 //! mass (1 + gamma) dv/dt = traction - brake - weight_kN (w0(v) + k mean(1/R) + tunnel)

@@ -15,7 +15,7 @@ pub const SPEED_MAX_MPS: f64 = 250.0;
 /// A longer step in s is divided.
 pub const STEP_MAX_S: f64 = 1.0;
 
-/// Speed in m/s after `step_s` of an acceleration that changes linearly in time from `start` to
+/// Returns the speed in m/s after `step_s` of an acceleration that changes linearly in time from `start` to
 /// `end` (m/s²), never below zero.
 ///
 /// A train that comes to rest within the step stays there until the acceleration turns positive.
@@ -68,7 +68,7 @@ pub fn advance(
 mod tests {
     use super::*;
 
-    /// The same motion in ten thousand explicit steps.
+    /// Returns the same motion in ten thousand explicit steps.
     fn by_small_steps(speed_mps: f64, start: f64, end: f64, step_s: f64) -> f64 {
         let count = 10_000;
         let h = step_s / f64::from(count);

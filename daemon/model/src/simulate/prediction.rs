@@ -58,12 +58,12 @@ pub struct Prediction {
 }
 
 impl Prediction {
-    /// An empty prediction.
+    /// Returns an empty prediction.
     pub fn new() -> Self {
         Prediction::default()
     }
 
-    /// Predicted measured speed in m/s at each sample; the measured one where the run cannot be
+    /// Returns the predicted measured speed in m/s at each sample; the measured one where the run cannot be
     /// simulated (see [`OpenLoopRecording::is_simulated`]).
     pub fn speed_mps(&self) -> &[f64] {
         &self.speed_mps
@@ -169,7 +169,7 @@ fn start_speed(recording: &OpenLoopRecording, model: &impl ForceModel, index: us
     if is_outlier { median_mps.clamp(0.0, SPEED_MAX_MPS) } else { measured_mps }
 }
 
-/// True for the last sample of a stand: a train departs after it.
+/// Returns true for the last sample of a stand: a train departs after it.
 #[inline]
 pub fn departs(samples: &[ResolvedSample], index: usize) -> bool {
     let stands = |at: usize| samples.get(at).is_some_and(|it| it.speed_mps <= STANDING_MPS);
@@ -190,7 +190,7 @@ pub struct SpeedError {
 }
 
 impl SpeedError {
-    /// The error of a prediction over the run's moving, simulated samples.
+    /// Returns the error of a prediction over the run's moving, simulated samples.
     ///
     /// # Panics
     ///
@@ -199,7 +199,7 @@ impl SpeedError {
         SpeedError::within(recording, prediction, 0..recording.samples().len())
     }
 
-    /// The same over some samples of the run.
+    /// Returns the same over some samples of the run.
     ///
     /// # Panics
     ///
@@ -222,7 +222,7 @@ impl SpeedError {
         error
     }
 
-    /// Root mean square in m/s; `None` without moving samples.
+    /// Returns the root mean square in m/s; `None` without moving samples.
     pub fn rmse_mps(&self) -> Option<f64> {
         (self.count > 0).then(|| (self.sum_of_squares / self.count as f64).sqrt())
     }

@@ -1,4 +1,4 @@
-//! A recorded run, made ready to be simulated, and what accelerates a train at its samples.
+//! A recorded run, prepared for simulation, and the accelerating forces at its samples.
 
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
@@ -105,12 +105,12 @@ impl OpenLoopRecording {
         Ok(OpenLoopRecording { samples, time_s, speed_mps, roles, knows_gradient, bridged })
     }
 
-    /// The samples, missing forces bridged where they could be.
+    /// Returns the samples, missing forces bridged where they could be.
     pub fn samples(&self) -> &[ResolvedSample] {
         &self.samples
     }
 
-    /// Time in s of each sample from the run's first.
+    /// Returns the time in s of each sample from the run's first.
     pub fn time_s(&self) -> &[f64] {
         &self.time_s
     }
@@ -120,18 +120,18 @@ impl OpenLoopRecording {
         self.knows_gradient
     }
 
-    /// Samples whose missing forces were interpolated.
+    /// Returns the samples whose missing forces were interpolated.
     pub fn bridged(&self) -> usize {
         self.bridged
     }
 
-    /// How often the simulation starts at a measured speed in mid-run, because forces or rows
+    /// Returns how often the simulation starts at a measured speed in mid-run, because forces or rows
     /// were missing for too long.
     pub fn restarts(&self) -> usize {
         self.roles.iter().filter(|role| **role == SampleRole::Starts).count() - 1
     }
 
-    /// True when the simulation gives a speed for this sample.
+    /// Returns whether the simulation gives a speed for this sample.
     ///
     /// # Panics
     ///
@@ -140,7 +140,7 @@ impl OpenLoopRecording {
         self.roles[index] != SampleRole::Unknown
     }
 
-    /// True where the simulation takes up the measured speed because nothing was known before.
+    /// Returns whether the simulation takes up the measured speed because nothing was known before.
     ///
     /// # Panics
     ///
@@ -230,7 +230,7 @@ pub trait ForceModel {
     /// dv/dt in m/s² at the sample of this index if the train went at `speed_mps` there.
     fn acceleration_mps2(&self, index: usize, speed_mps: f64) -> f64;
 
-    /// Measured speed over true speed; differs from 1 where the wheel diameter is not the
+    /// Returns the measured speed over true speed; differs from 1 where the wheel diameter is not the
     /// declared one.
     fn speed_scale(&self) -> f64 {
         1.0
@@ -259,7 +259,7 @@ pub struct QuadraticForces {
 }
 
 impl QuadraticForces {
-    /// The declared model over a run with the given Davis coefficients.
+    /// Returns the declared model over a run with the given Davis coefficients.
     pub fn declared(recording: &OpenLoopRecording, resistance: Davis) -> Self {
         let mut forces = QuadraticForces::default();
         let polynomial = |sample| declared_polynomial(sample, resistance);
@@ -293,7 +293,7 @@ impl ForceModel for QuadraticForces {
     }
 }
 
-/// The declared model at a sample. A gradient that is not known counts as level track;
+/// Returns the declared model at a sample. A gradient that is not known counts as level track;
 /// [`OpenLoopRecording::knows_gradient`] says.
 pub fn declared_polynomial(sample: &ResolvedSample, resistance: Davis) -> Polynomial {
     let Davis { a, b, c } = resistance;
@@ -311,7 +311,7 @@ pub fn declared_polynomial(sample: &ResolvedSample, resistance: Davis) -> Polyno
 pub(super) mod tests {
     use super::*;
 
-    /// A train of 100 t with gamma 0.06 that coasts on the level at 20 m/s.
+    /// Returns a train of 100 t with gamma 0.06 that coasts on the level at 20 m/s.
     pub(in crate::simulate) fn coasting_sample(time_s: f64) -> ResolvedSample {
         ResolvedSample { time_ns: (time_s * 1e9).round() as i64, ..ResolvedSample::coasting() }
     }

@@ -14,7 +14,7 @@ pub const RATIO_LEAST: f64 = 0.97;
 /// Standard deviation, as a share of it, of a brake force that pressure and disc should exert: few exert it.
 pub const DECLARED_BRAKE_STD: f64 = 0.05;
 
-/// The brake force in N that the rail carries.
+/// Returns the brake force in N that the rail carries.
 #[inline]
 pub fn carried_n(brake_n: f64, adhesion: f64, weight_n: f64) -> f64 {
     brake_n.min(adhesion * weight_n)

@@ -20,7 +20,7 @@ pub const PARAMETERS: [Parameter; 1] = [Parameter::new("w0_per_k", (-0.05, 0.05)
 /// A smaller change per kelvin does not matter over the temperatures of a year.
 pub const LEAST_PER_K: f64 = 0.001;
 
-/// How much warmer than a reference in K it is outside, in K.
+/// Returns how much warmer than a reference in K it is outside, in K.
 #[inline]
 pub fn warmer_k(degc: Option<f64>, reference_k: f64) -> f64 {
     degc.map_or(0.0, |degc| degc + ZERO_DEGC_K - reference_k)

@@ -28,7 +28,7 @@ pub struct WarmUp {
 }
 
 impl WarmUp {
-    /// Time in s since the bearings were cold, at a sample.
+    /// Returns the time in s since the bearings were cold, at a sample.
     pub fn since_cold_s(&mut self, time_ns: i64) -> f64 {
         let seconds = |from_ns: i64| time_ns.saturating_sub(from_ns) as f64 * 1e-9;
         let from_ns = match self.from_and_last_ns {

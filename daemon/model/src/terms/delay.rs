@@ -45,7 +45,7 @@ pub struct DelayLine<const N: usize> {
 }
 
 impl<const N: usize> DelayLine<N> {
-    /// A line of a dead time and a lag in s, without numbers.
+    /// Returns a line of a dead time and a lag in s, without numbers.
     pub fn new(delay_s: f64, lag_s: f64) -> Self {
         DelayLine {
             delay_s,
@@ -101,7 +101,7 @@ impl<const N: usize> DelayLine<N> {
         Some(self.lagged(time_s, input))
     }
 
-    /// The reported numbers at a time, linear between samples, the oldest before all of them.
+    /// Returns the reported numbers at a time, linear between samples, the oldest before all of them.
     fn at(&mut self, time_s: f64) -> [f64; N] {
         let entry = |back: usize| self.past[(self.next + CAPACITY - 1 - back) % CAPACITY];
         // Times grow: what held last has become one older, and what holds now is no older.

@@ -31,7 +31,7 @@ pub fn err(error: &GradientError, (position_m, direction): (f64, f64), permille:
     *permille += direction * error.at(position_m, direction);
 }
 
-/// Gradient in ‰ along the travel under a train of a length in m, whose profile is moved by
+/// Returns the gradient in ‰ along the travel under a train of a length in m, whose profile is moved by
 /// `shift_m` beyond what the line declares.
 #[inline]
 pub fn along_travel_permille(

@@ -35,7 +35,7 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// A parameter with its bounds.
+    /// Returns a parameter with its bounds.
     pub const fn new(name: &'static str, (lower, upper): (f64, f64), step: f64) -> Self {
         Parameter { name, lower, upper, step }
     }

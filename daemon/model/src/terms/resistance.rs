@@ -22,7 +22,7 @@ macro_rules! parts {
             /// Number of its parts.
             pub const PARTS: usize = [$( stringify!($part) ),*].len();
 
-            /// Its parts, in the order of the fields.
+            /// Returns its parts, in the order of the fields.
             pub fn parts(&self) -> [f64; Self::PARTS] {
                 [$( self.$part ),*]
             }
@@ -78,7 +78,7 @@ impl Resistance {
         if speed_mps + self.headwind_mps < 0.0 { -1.0 } else { 1.0 }
     }
 
-    /// Everything but the basic resistance of these coefficients, in N/kN.
+    /// Returns everything but the basic resistance of these coefficients, in N/kN.
     #[inline]
     pub fn extra_n_per_kn(&self, davis: Davis, speed_mps: f64) -> f64 {
         self.curve_n_per_kn
@@ -110,13 +110,13 @@ impl Resistance {
         (self.factor - 1.0) * davis.w0_n_per_kn(speed_mps)
     }
 
-    /// Everything in no library, in N/kN, for speeds near that at which it was taken.
+    /// Returns everything in no library, in N/kN, for speeds near that at which it was taken.
     #[inline]
     pub fn other_at_n_per_kn(&self, speed_mps: f64) -> f64 {
         self.other_n_per_kn + self.other_per_mps * speed_mps
     }
 
-    /// All resistance in N/kN as p0 + p1 v + p2 v², for speeds near `near_mps`: the sign of the
+    /// Returns all resistance in N/kN as p0 + p1 v + p2 v², for speeds near `near_mps`: the sign of the
     /// air resistance is taken there.
     #[inline]
     pub fn polynomial(&self, davis: Davis, near_mps: f64) -> [f64; 3] {

@@ -11,7 +11,7 @@ use super::{Least, Suspect, SuspectInput};
 /// Speed in m/s from the middle of a band to those of its neighbours, where it ends.
 const WIDTH_MPS: f64 = 7.5;
 
-/// Share of a band that a speed lies in; bands add up to 1 everywhere, the last has no end.
+/// Returns the share of a band that a speed lies in; bands add up to 1 everywhere, the last has no end.
 fn share(band: usize, speed_mps: f64) -> f64 {
     let place = speed_mps / WIDTH_MPS - band as f64;
     if band + 1 == BANDS.len() && place > 0.0 { 1.0 } else { (1.0 - place.abs()).max(0.0) }

@@ -51,7 +51,7 @@ impl LateSpeed {
         self.cylinder_pressure_pa.restart(delay_s, lag_s);
     }
 
-    /// The forces in N behind a speed in m/s of a time in ns of a motion segment; `None` while none are known.
+    /// Returns the forces in N behind a speed in m/s of a time in ns of a motion segment; `None` while none are known.
     /// A brake on a train that stands moves nothing, and no lag remembers it.
     pub fn forces(
         &mut self,
@@ -64,7 +64,7 @@ impl LateSpeed {
         })
     }
 
-    /// Gradient in ‰ and resistance behind it.
+    /// Returns the gradient in ‰ and resistance behind it.
     pub fn resisting(
         &mut self,
         at: (i64, u32),
@@ -78,7 +78,7 @@ impl LateSpeed {
         (permille, Resistance::of_parts(parts))
     }
 
-    /// Chainage in m where the train was then; `None` while it is not known.
+    /// Returns the chainage in m where the train was then; `None` while it is not known.
     pub fn position_m(&mut self, at: (i64, u32), now: Option<f64>) -> Option<f64> {
         self.position_m.acting(at, now.map(|m| [m])).map(|[m]| m)
     }

@@ -13,7 +13,7 @@ pub const LEAST: f64 = 0.01;
 /// Standard deviation of the scale of a reported force.
 pub const USUAL_STD: f64 = 0.007;
 
-/// The true force in N behind a reported one.
+/// Returns the true force in N behind a reported one.
 #[inline]
 pub fn true_force_n(reported_n: f64, gain: f64) -> f64 {
     reported_n / gain

@@ -12,7 +12,7 @@ pub const PARAMETERS: [Parameter; 1] = [Parameter::new("speed_scale", (0.88, 1.1
 /// Least effect; the wear of a wheel between two measurements is less.
 pub const LEAST: f64 = 0.003;
 
-/// The true speed in m/s behind a measured one.
+/// Returns the true speed in m/s behind a measured one.
 #[inline]
 pub fn true_speed_mps(measured_mps: f64, speed_scale: f64) -> f64 {
     measured_mps / speed_scale

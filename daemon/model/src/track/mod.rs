@@ -21,7 +21,7 @@ pub const RESISTANCE: &str = "resistance";
 /// process along the chainage.
 pub const GRADIENT_ERROR_FREE_M: f64 = 200.0;
 
-/// Share of a surveyed gradient's error that is still there after a distance in m.
+/// Returns the share of a surveyed gradient's error that is still there after a distance in m.
 pub fn gradient_error_kept(distance_m: f64) -> f64 {
     (-2.0 * distance_m.abs() / GRADIENT_ERROR_FREE_M).exp()
 }
@@ -122,7 +122,7 @@ struct TunnelProfiles {
 }
 
 impl Track {
-    /// A line from its lists; a list that is `None` is not known.
+    /// Returns a line from its lists; a list that is `None` is not known.
     ///
     /// `gradient` holds (chainage in m, ‰ climbing positive as the chainage grows), each
     /// valid until the next.
@@ -179,14 +179,14 @@ impl Track {
         self.masses.iter().filter(holds).map(|section| section.mass_factor).product()
     }
 
-    /// Mean gradient in ‰ under a train, climbing positive as the chainage grows.
+    /// Returns the mean gradient in ‰ under a train, climbing positive as the chainage grows.
     ///
     /// `centre_m` is the chainage of the train's centre. `None` when no gradient is known.
     pub fn gradient_permille(&self, centre_m: f64, train_length_m: f64) -> Option<f64> {
         self.gradient_towards_permille(1.0, centre_m, train_length_m)
     }
 
-    /// The same for a direction of travel, +1 or -1: trains may climb by another way than they
+    /// Returns the same for a direction of travel, +1 or -1: trains may climb by another way than they
     /// descend.
     pub fn gradient_towards_permille(
         &self,
@@ -206,14 +206,14 @@ impl Track {
         })
     }
 
-    /// Standard deviation in ‰ of the gradient under a train, as a survey states it; `None` when it is
+    /// Returns the standard deviation in ‰ of the gradient under a train, as a survey states it; `None` when it is
     /// not stated. How it goes with the distance: [`gradient_error_kept`].
     pub fn gradient_std_here_permille(&self, centre_m: f64, train_length_m: f64) -> Option<f64> {
         let half_m = 0.5 * train_length_m;
         self.gradient_std_permille(centre_m - half_m, centre_m + half_m)
     }
 
-    /// Standard deviation in ‰ of the mean gradient over an interval, as a survey states it: errors
+    /// Returns the standard deviation in ‰ of the mean gradient over an interval, as a survey states it: errors
     /// of intervals further apart than [`GRADIENT_ERROR_FREE_M`] are their own. `None` when it is not
     /// stated.
     pub fn gradient_std_permille(&self, from_m: f64, to_m: f64) -> Option<f64> {
@@ -223,59 +223,59 @@ impl Track {
         Some(std * (GRADIENT_ERROR_FREE_M / length_m.max(GRADIENT_ERROR_FREE_M)).sqrt())
     }
 
-    /// True when both directions have one gradient profile.
+    /// Returns whether both directions have one gradient profile.
     pub fn is_one_profile(&self) -> bool {
         self.survey.gradient_falling.is_none()
     }
 
-    /// True when a level line is declared, or none: nobody surveyed its gradient.
+    /// Returns whether a level line is declared, or none: nobody surveyed its gradient.
     pub fn is_level(&self) -> bool {
         let profiles = [self.gradient_permille.as_ref(), self.survey.gradient_falling.as_ref()];
         profiles.into_iter().flatten().all(|profile| profile.entries().all(|(_, it)| it == 0.0))
     }
 
-    /// Mean of 1/R in 1/m along a train; `None` when no curves are known.
+    /// Returns the mean of 1/R in 1/m along a train; `None` when no curves are known.
     pub fn curvature_per_m(&self, centre_m: f64, train_length_m: f64) -> Option<f64> {
         Some(self.curvature_per_m.as_ref()?.mean_around(centre_m, train_length_m))
     }
 
-    /// Share of the train inside tunnels, 0 to 1; `None` when no tunnels are known.
+    /// Returns the share of the train inside tunnels, 0 to 1; `None` when no tunnels are known.
     pub fn tunnel_share(&self, centre_m: f64, train_length_m: f64) -> Option<f64> {
         Some(self.tunnel.as_ref()?.inside.mean_around(centre_m, train_length_m))
     }
 
-    /// Length in m of the tunnel around the train, weighted by the share of the train inside;
+    /// Returns the length in m of the tunnel around the train, weighted by the share of the train inside;
     /// `None` when no tunnels are known.
     pub fn tunnel_length_m(&self, centre_m: f64, train_length_m: f64) -> Option<f64> {
         Some(self.tunnel.as_ref()?.length_m.mean_around(centre_m, train_length_m))
     }
 
-    /// The gradient profile as surveyed, when known.
+    /// Returns the gradient profile as surveyed, when known.
     pub fn gradient(&self) -> Option<&StepProfile> {
         self.gradient_permille.as_ref()
     }
 
-    /// The known curves, by chainage as declared.
+    /// Returns the known curves, by chainage as declared.
     pub fn curves(&self) -> &[TrackCurve] {
         &self.curves
     }
 
-    /// The known tunnels, as declared.
+    /// Returns the known tunnels, as declared.
     pub fn tunnels(&self) -> &[Tunnel] {
         &self.tunnels
     }
 
-    /// The further resistance in N/kN at places, zero elsewhere, when known.
+    /// Returns the further resistance in N/kN at places, zero elsewhere, when known.
     pub fn resistance(&self) -> Option<&StepProfile> {
         self.resistance_n_per_kn.as_ref()
     }
 
-    /// True when the list of curves is known, be it empty.
+    /// Returns whether the list of curves is known, be it empty.
     pub fn knows_curves(&self) -> bool {
         self.curvature_per_m.is_some()
     }
 
-    /// True when the list of tunnels is known, be it empty.
+    /// Returns whether the list of tunnels is known, be it empty.
     pub fn knows_tunnels(&self) -> bool {
         self.tunnel.is_some()
     }
@@ -390,7 +390,7 @@ pub struct MassSection {
 }
 
 impl MassSection {
-    /// True at a chainage in m in a direction of travel.
+    /// Returns true at a chainage in m in a direction of travel.
     #[inline]
     pub fn holds(&self, centre_m: f64, direction: f64) -> bool {
         self.direction == direction && (self.from_m..self.to_m).contains(&centre_m)

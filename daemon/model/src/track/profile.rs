@@ -47,7 +47,7 @@ pub struct StepProfile {
 }
 
 impl StepProfile {
-    /// A profile from (chainage in m, value) entries of strictly increasing chainage.
+    /// Returns a profile from (chainage in m, value) entries of strictly increasing chainage.
     ///
     /// # Errors
     ///
@@ -103,7 +103,7 @@ impl StepProfile {
         entry
     }
 
-    /// The value at a chainage in m.
+    /// Returns the value at a chainage in m.
     pub fn value_at(&self, chainage_m: f64) -> f64 {
         self.values[self.entry_at(chainage_m)]
     }
@@ -113,12 +113,12 @@ impl StepProfile {
         self.integral_within(self.entry_at(chainage_m), chainage_m)
     }
 
-    /// The same to a chainage in m of an entry.
+    /// Returns the same to a chainage in m of an entry.
     fn integral_within(&self, entry: usize, chainage_m: f64) -> f64 {
         self.cumulative[entry] + self.values[entry] * (chainage_m - self.starts_m[entry])
     }
 
-    /// Mean of the function over a train of `length_m` around its centre; the value at the
+    /// Returns the mean of the function over a train of `length_m` around its centre; the value at the
     /// centre for a train without length.
     pub fn mean_around(&self, centre_m: f64, length_m: f64) -> f64 {
         if length_m <= 0.0 {
@@ -135,13 +135,13 @@ impl StepProfile {
             / length_m
     }
 
-    /// The entries (chainage in m, value).
+    /// Returns the entries (chainage in m, value).
     pub fn entries(&self) -> impl ExactSizeIterator<Item = (f64, f64)> + '_ {
         self.starts_m.iter().copied().zip(self.values.iter().copied())
     }
 }
 
-/// The value at a place on the straight lines between points (place, value) in order, and that of the
+/// Returns the value at a place on the straight lines between points (place, value) in order, and that of the
 /// nearest end beyond; 0 without points.
 pub fn along_line(points: &[(f64, f64)], at: f64) -> f64 {
     let after = points.partition_point(|point| point.0 <= at);
@@ -159,7 +159,7 @@ pub struct LinearProfile {
 }
 
 impl LinearProfile {
-    /// A profile through (chainage in m, value) entries of strictly increasing chainage.
+    /// Returns a profile through (chainage in m, value) entries of strictly increasing chainage.
     ///
     /// # Errors
     ///
@@ -169,13 +169,13 @@ impl LinearProfile {
         Ok(LinearProfile { entries })
     }
 
-    /// The value at a chainage in m.
+    /// Returns the value at a chainage in m.
     #[inline]
     pub fn at(&self, chainage_m: f64) -> f64 {
         along_line(&self.entries, chainage_m)
     }
 
-    /// The entries.
+    /// Returns the entries.
     pub fn entries(&self) -> &[(f64, f64)] {
         &self.entries
     }

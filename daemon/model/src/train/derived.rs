@@ -1,4 +1,4 @@
-//! Quantities that follow from what a train declares: forces, weights, loads and speeds.
+//! Quantities derived from a declared train: forces, weights, loads and speeds.
 
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
@@ -20,7 +20,7 @@ impl FrictionBrake {
 }
 
 impl TrainModel {
-    /// A train of which only mass and basic resistance are declared: a point without rotating
+    /// Returns a train of which only mass and basic resistance are declared: a point without rotating
     /// mass that nothing else holds back. Simulations set what else they need.
     pub fn bare(name: &str, mass_kg: f64, resistance: Davis) -> Self {
         TrainModel {
@@ -39,12 +39,12 @@ impl TrainModel {
         Some((0.5 * (self.mass_kg + full_kg), (full_kg - self.mass_kg) / 12_f64.sqrt()))
     }
 
-    /// Weight in kN of a mass in kg.
+    /// Returns the weight in kN of a mass in kg.
     pub fn weight_kn(mass_kg: f64) -> f64 {
         mass_kg * STANDARD_GRAVITY_MPS2 / 1000.0
     }
 
-    /// The highest speed in m/s of the effort curves; `None` without curves.
+    /// Returns the highest speed in m/s of the effort curves; `None` without curves.
     pub fn speed_max_mps(&self) -> Option<f64> {
         let last =
             |curve: &Option<EffortCurve>| curve.as_ref()?.points().last().map(|point| point.0);
@@ -69,7 +69,7 @@ impl PowerTrain {
         if drive_w >= 0.0 { self.efficiency * drive_w } else { drive_w / self.efficiency }
     }
 
-    /// Traction minus brake force of the drive in N at a speed in m/s; `None` where it turns too
+    /// Returns the traction minus brake force of the drive in N at a speed in m/s; `None` where it turns too
     /// slowly for its power to determine the force.
     pub fn force_n(&self, recorded_w: f64, speed_mps: f64) -> Option<f64> {
         let is_known = recorded_w.is_finite() && speed_mps >= self.speed_min_mps;

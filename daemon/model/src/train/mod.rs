@@ -19,7 +19,7 @@ pub struct EffortCurve {
 }
 
 impl EffortCurve {
-    /// A curve through points of strictly increasing, finite speed and finite force >= 0;
+    /// Returns a curve through points of strictly increasing, finite speed and finite force >= 0;
     /// `None` when there is no point or one breaks the order.
     pub fn new(points: Vec<(f64, f64)>) -> Option<Self> {
         let is_finite = points.iter().all(|&(v, f)| v.is_finite() && f.is_finite() && f >= 0.0);
@@ -27,17 +27,17 @@ impl EffortCurve {
         (!points.is_empty() && is_finite && is_ordered).then_some(EffortCurve { points })
     }
 
-    /// Force in N at a speed in m/s.
+    /// Returns the force in N at a speed in m/s.
     pub fn force_n(&self, speed_mps: f64) -> f64 {
         along_line(&self.points, speed_mps)
     }
 
-    /// The points (speed in m/s, force in N).
+    /// Returns the points (speed in m/s, force in N).
     pub fn points(&self) -> &[(f64, f64)] {
         &self.points
     }
 
-    /// The greatest force in N.
+    /// Returns the greatest force in N.
     pub fn force_max_n(&self) -> f64 {
         self.points.iter().map(|&(_, force)| force).fold(0.0, f64::max)
     }

@@ -49,39 +49,39 @@ impl NumberRule {
         NumberRule { is_above: true, ..Self::within(below, greatest, allowed) }
     }
 
-    /// The same for a number that its table must hold.
+    /// Returns the same for a number that its table must hold.
     pub const fn required(self) -> Self {
         NumberRule { is_required: true, ..self }
     }
 
-    /// The same for a whole number.
+    /// Returns the same for a whole number.
     pub const fn whole(self) -> Self {
         NumberRule { is_whole: true, ..self }
     }
 
-    /// The same for a number that the model holds this many times greater.
+    /// Returns the same for a number that the model holds this many times greater.
     pub const fn times(self, factor: f64) -> Self {
         NumberRule { factor, ..self }
     }
 
-    /// The same for a number to which findings add.
+    /// Returns the same for a number to which findings add.
     pub const fn added(self) -> Self {
         NumberRule { joined: Joined::Added, ..self }
     }
 
-    /// The same for a number with which findings multiply.
+    /// Returns the same for a number with which findings multiply.
     pub const fn multiplied(self) -> Self {
         NumberRule { joined: Joined::Multiplied, ..self }
     }
 
-    /// True for a number that may stand in the file.
+    /// Returns true for a number that may stand in the file.
     pub fn allows(&self, value: f64) -> bool {
         let is_above = !self.is_above || value > self.range[0];
         let is_whole = !self.is_whole || value.fract() == 0.0;
         (self.range[0]..=self.range[1]).contains(&value) && is_above && is_whole
     }
 
-    /// The declared number joined with one that was found.
+    /// Returns the declared number joined with one that was found.
     pub fn join(&self, declared: f64, found: f64) -> f64 {
         match self.joined {
             Joined::Replaced => found,

@@ -79,7 +79,7 @@ pub struct SyncArguments {
 }
 
 impl SyncArguments {
-    /// How often; `None` for never.
+    /// Returns how often; `None` for never.
     pub fn every(&self) -> Option<Duration> {
         (self.sync_ms > 0).then(|| Duration::from_millis(self.sync_ms))
     }

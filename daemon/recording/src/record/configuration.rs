@@ -25,7 +25,7 @@ pub struct Configuration {
 }
 
 impl Configuration {
-    /// The configuration of the daemon of this process: the file given, else the one that its command
+    /// Returns the configuration of the daemon of this process: the file given, else the one that its command
     /// line names.
     ///
     /// # Errors
@@ -46,7 +46,7 @@ impl Configuration {
             .map_err(|problem| format!("the daemon's configuration is not attached: {problem}"))
     }
 
-    /// The directory of the store of models that it names.
+    /// Returns the directory of the store of models that it names.
     pub fn store(&self) -> Option<PathBuf> {
         let (_, text) = self.files.first()?;
         Some(self.path.parent()?.join(store_of(&text.parse().ok()?)?))
@@ -76,7 +76,7 @@ impl Configuration {
     }
 }
 
-/// The model that the store of a configuration has put in force for a train; `None` where what the
+/// Returns the model that the store of a configuration has put in force for a train; `None` where what the
 /// configuration declares is.
 fn adopted(table: &Table, folder: &Path, train: i64) -> Result<Option<ModelText>, String> {
     let Some(directory) = store_of(table) else { return Ok(None) };
@@ -89,7 +89,7 @@ fn store_of(configuration: &Table) -> Option<PathBuf> {
     Some(configuration.get("models")?.get("directory")?.as_str()?.into())
 }
 
-/// The file behind `--config` in the command line of a process of this user.
+/// Returns the file behind `--config` in the command line of a process of this user.
 fn named_by(process: u32) -> Option<PathBuf> {
     let folder = PathBuf::from(format!("/proc/{process}"));
     let line = std::fs::read(folder.join("cmdline")).ok()?;

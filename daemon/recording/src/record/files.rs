@@ -113,12 +113,12 @@ impl RecordingFiles {
         Ok(RecordingFiles { housekeeper, ..self })
     }
 
-    /// Samples, snapshots and events that no power cut takes any more.
+    /// Returns the samples, snapshots and events that no power cut takes any more.
     pub fn lasting(&self) -> u64 {
         self.housekeeper.lasting()
     }
 
-    /// The file that is written.
+    /// Returns the file that is written.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -297,7 +297,7 @@ pub struct Ages {
 }
 
 impl Ages {
-    /// The files that a recorder finds when it begins; none took longer than `part`, where that is known.
+    /// Returns the files that a recorder finds when it begins; none took longer than `part`, where that is known.
     pub fn of_what_is_there(output: &Path, part: Option<Duration>) -> Self {
         let (at, mut age) = (Instant::now(), Duration::ZERO);
         let (mut ended, mut later) = (HashMap::new(), None::<SystemTime>);
@@ -321,7 +321,7 @@ impl Ages {
         }
     }
 
-    /// All files, the oldest first: none is younger than one after it.
+    /// Returns all files, the oldest first: none is younger than one after it.
     pub fn of_files(&self, output: &Path) -> Vec<Aged> {
         let mut least = Duration::ZERO;
         let files = numbered(output).into_iter().rev().map(|(_, path)| {
@@ -335,7 +335,7 @@ impl Ages {
     }
 }
 
-/// The files of a rotating recording with their numbers, the oldest first.
+/// Returns the files of a rotating recording with their numbers, the oldest first.
 pub fn numbered(output: &Path) -> Vec<(u64, PathBuf)> {
     let stem = output.file_stem().unwrap_or_default().to_string_lossy().into_owned() + "-";
     let number_of = |path: &Path| {
@@ -353,7 +353,7 @@ pub fn numbered(output: &Path) -> Vec<(u64, PathBuf)> {
 /// Digits of a file's number.
 const DIGITS: usize = 6;
 
-/// The name of the next file: `run-000007.mcap` for `run.mcap`.
+/// Returns the name of the next file: `run-000007.mcap` for `run.mcap`.
 pub fn next(output: &Path) -> PathBuf {
     let number = numbered(output).last().map_or(1, |newest| newest.0 + 1);
     let stem = output.file_stem().unwrap_or_default().to_string_lossy();

@@ -187,12 +187,12 @@ impl Housekeeper {
         }
     }
 
-    /// True while a file waits to be brought to the disk: it need not be asked for again.
+    /// Returns whether a file waits to be brought to the disk: it need not be asked for again.
     pub fn is_settling(&self) -> bool {
         self.progress.is_settling.load(Ordering::Acquire)
     }
 
-    /// Samples, snapshots and events that no power cut takes any more.
+    /// Returns the samples, snapshots and events that no power cut takes any more.
     pub fn lasting(&self) -> u64 {
         self.progress.lasting.load(Ordering::Acquire)
     }
@@ -221,7 +221,7 @@ pub struct Rotation {
 }
 
 impl Rotation {
-    /// True when new files are begun at all.
+    /// Returns whether new files are begun at all.
     pub fn is_on(self) -> bool {
         self.bytes.is_some() || self.age.is_some()
     }

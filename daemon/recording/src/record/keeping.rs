@@ -93,7 +93,7 @@ impl std::fmt::Debug for EventKeeper {
     }
 }
 
-/// True for an event around which a flight recorder keeps what it has: a suspicion, a fault, a request.
+/// Returns true for an event around which a flight recorder keeps what it has: a suspicion, a fault, a request.
 pub fn is_reason(event: &Event) -> bool {
     match event.kind() {
         EventKind::SuspicionRaised
@@ -106,7 +106,7 @@ pub fn is_reason(event: &Event) -> bool {
     }
 }
 
-/// The request that was made in a ring's folder since the last look, in words.
+/// Returns the request that was made in a ring's folder since the last look, in words.
 pub fn requested(ring: &Path) -> Option<String> {
     let path = ring.join(REQUEST_FILE);
     let text = fs::read_to_string(&path).ok()?;
@@ -200,12 +200,12 @@ impl EventKeeper {
         kept
     }
 
-    /// The newest event, unless it is at its end.
+    /// Returns the newest event, unless it is at its end.
     fn take_open(&mut self) -> Option<(PathBuf, KeptEvent)> {
         self.open.take().filter(|_| Instant::now() < self.until)
     }
 
-    /// The files that reach back by no more than is kept before a moment, and the newest: it is being written,
+    /// Returns the files that reach back by no more than is kept before a moment, and the newest: it is being written,
     /// whenever that was last.
     fn near(&self, files: &[Aged]) -> Vec<PathBuf> {
         let newest = files.len().saturating_sub(1);

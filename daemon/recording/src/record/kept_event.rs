@@ -70,7 +70,7 @@ impl KeptEvent {
 }
 
 impl Reason {
-    /// The reason that an event is.
+    /// Returns the reason that an event is.
     pub fn of(event: &Event, now: SystemTime) -> Self {
         Reason {
             at: UtcSecond::of(now).to_string(),
@@ -80,14 +80,14 @@ impl Reason {
         }
     }
 
-    /// True for the same over again, whose words differ at most by a number.
+    /// Returns true for the same over again, whose words differ at most by a number.
     pub fn is_like(&self, other: &Reason) -> bool {
         (self.train, &self.kind) == (other.train, &other.kind)
             && (self.text == other.text || self.kind == EventKind::SamplesLost.name())
     }
 }
 
-/// The name under which an event or an account comes into being: a ring has one keeper.
+/// Returns the name under which an event or an account comes into being: a ring has one keeper.
 pub fn beside(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     path.with_file_name(format!(".{name}.part"))
@@ -106,7 +106,7 @@ pub fn forget_unfinished(kept: &Path) {
     }
 }
 
-/// The event that ends last, by what its folder says.
+/// Returns the event that ends last, by what its folder says.
 pub fn newest(kept: &Path) -> Option<(PathBuf, KeptEvent)> {
     let now = Stamp::now();
     let folders = fs::read_dir(kept).ok()?.flatten().map(|it| it.path());

@@ -1,5 +1,5 @@
-//! The recorder: what is read of the trains' channels goes into files, which can be read up to the
-//! last flush, whatever ends it.
+//! The recorder: it writes the messages of the trains' channels into files, which can be read up to the last flush,
+//! whatever ends it.
 
 mod configuration;
 mod files;
@@ -100,7 +100,7 @@ pub struct Recorded {
 }
 
 impl Recorded {
-    /// All that was written.
+    /// Returns all that was written.
     pub fn items(&self) -> u64 {
         self.samples + self.snapshots + self.events
     }

@@ -1,4 +1,4 @@
-//! A daemon configuration: what it serves, with which estimators, on which threads.
+//! A daemon configuration in words: its trains, estimators and threads.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -32,7 +32,7 @@ pub fn read(path: &Path) -> Result<DaemonConfig, Failure> {
     Ok(config)
 }
 
-/// The configuration in words and columns.
+/// Returns the configuration in words and columns.
 pub fn report(config: &DaemonConfig) -> String {
     let mut text = String::from("daemon\n");
     let root = config.process.root.as_ref().map(|root| root.display().to_string());
@@ -94,7 +94,7 @@ pub fn report(config: &DaemonConfig) -> String {
     format!("{text}\n{trains}\n{pipelines}\n{answers}")
 }
 
-/// Each quantity that a train's controller may ask for, with the pipeline that answers.
+/// Returns each quantity that a train's controller may ask for, with the pipeline that answers.
 fn answers_of<'a>(
     config: &'a DaemonConfig,
     train: &'a TrainConfig,
@@ -131,7 +131,7 @@ struct PipelineAnswer<'a> {
     trains: Vec<u64>,
 }
 
-/// The machine-readable form of a configuration.
+/// Returns the machine-readable form of a configuration.
 pub fn answer(config: &DaemonConfig) -> DaemonAnswer<'_> {
     DaemonAnswer {
         trains: config

@@ -1,4 +1,4 @@
-//! The screen, drawn from what is known: no clock, no channel.
+//! The screen, drawn from the state alone: it knows no clock and no channel.
 //!
 //! 80 x 24 hold everything; larger terminals get the resistance at more speeds and plots.
 

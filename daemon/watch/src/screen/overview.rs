@@ -1,4 +1,4 @@
-//! Quantities, residual, what to drive next and every pipeline with its samples; plots where there is room.
+//! Quantities, residual, the next manoeuvre, and every pipeline with its samples; plots where there is room.
 
 use dynocar::operator::{duration, refusals, refused_words};
 use ratatui::Frame;
@@ -46,7 +46,7 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, train: &TrainState, palette: Pale
     }
 }
 
-/// Rows that a line takes at most when it is wrapped between words.
+/// Returns the rows that a line takes at most when it is wrapped between words.
 fn rows_of(line: &Line<'_>, width: u16) -> u16 {
     let columns = line.width() as u16;
     if columns <= width { 1 } else { columns.div_ceil(width.saturating_sub(16).max(1)) }

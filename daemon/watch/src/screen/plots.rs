@@ -65,7 +65,7 @@ fn chart(
     frame.render_widget(chart, area);
 }
 
-/// Bounds around all values and 0.
+/// Returns the bounds around all values and 0.
 fn range(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
     let low = values.clone().fold(0.0, f64::min);
     let high = values.fold(0.0, f64::max);

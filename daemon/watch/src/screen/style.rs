@@ -45,7 +45,7 @@ impl Palette {
         self.coloured(Color::Cyan)
     }
 
-    /// A state of use.
+    /// Returns a state of use.
     pub fn use_state(self, state: UseState) -> Style {
         match state {
             UseState::Usable => self.coloured(Color::Green),
@@ -55,7 +55,7 @@ impl Palette {
         }
     }
 
-    /// A status.
+    /// Returns a status.
     pub fn status(self, status: Status) -> Style {
         match status {
             Status::Estimated => self.coloured(Color::Green),
@@ -66,7 +66,7 @@ impl Palette {
     }
 }
 
-/// A heading over a section, with a rule to the right edge.
+/// Returns a heading over a section, with a rule to the right edge.
 pub fn heading(words: &str, width: u16, palette: Palette) -> Line<'static> {
     let rule = "─".repeat(usize::from(width).saturating_sub(words.chars().count() + 4));
     Line::styled(format!("── {words} {rule}"), palette.faint())

@@ -113,7 +113,7 @@ pub fn execute(arguments: &BrakesArguments) -> Result<(), Failure> {
     Ok(give(arguments.json.as_deref(), &answer, || text(&answer, gamma))?)
 }
 
-/// A confidence below certainty, which no number of stops gives.
+/// Returns a confidence below certainty, which no number of stops gives.
 fn confidence(text: &str) -> Result<f64, String> {
     let share = share(text)?;
     (share < 1.0).then_some(share).ok_or_else(|| "expected a share above 0 and below 1".into())
@@ -136,7 +136,7 @@ fn studied(
     Ok((datasets, study))
 }
 
-/// Why there are no parameters, and what remains.
+/// Returns why there are no parameters, and what remains.
 fn without_law(study: &Study) -> Failure {
     let mut words =
         format!("none of {} stops to fit is one by all of the brake", study.stops.len());
@@ -303,7 +303,7 @@ fn text(answer: &BrakesAnswer, gamma: f64) -> String {
     text
 }
 
-/// Deceleration over speed: what is certain and in the steps, the bound, and the mean.
+/// Returns the deceleration over speed: what is certain and in the steps, the bound, and the mean.
 fn picture(parameters: &BrakeParameters, law: &DecelerationLaw) -> String {
     const WIDTH: f64 = 56.0;
     let most = law.points.iter().map(|it| it.deceleration_mps2).fold(0.1, f64::max);

@@ -1,5 +1,4 @@
-//! `dynocar check`: reads a dataset, a train, a track or a daemon configuration and says what it
-//! understood.
+//! `dynocar check`: reads a dataset, a train, a track or a daemon configuration and states its meaning.
 
 mod json;
 mod report;
@@ -47,12 +46,12 @@ pub fn run(arguments: &CheckArguments) -> Result<(), Failure> {
 }
 
 impl Understood {
-    /// The answer for machines.
+    /// Returns the answer for machines.
     pub fn answer(&self, path: &Path) -> impl Serialize {
         json::answer(path, self)
     }
 
-    /// The answer for people.
+    /// Returns the answer for people.
     pub fn text(&self) -> String {
         report::report(self)
     }

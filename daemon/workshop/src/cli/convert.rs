@@ -84,7 +84,7 @@ fn is_dataset(path: &Path) -> bool {
     }
 }
 
-/// The recording in Parquet, which is one path.
+/// Returns the recording in Parquet, which is one path.
 ///
 /// # Errors
 ///

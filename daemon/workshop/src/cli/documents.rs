@@ -31,7 +31,7 @@ pub fn write_manual(arguments: &ManArguments, commands: Command) -> Result<(), F
     Ok(())
 }
 
-/// Every page with its file's name: the program's first, then its commands' in their order.
+/// Returns every page with its file's name: the program's first, then its commands' in their order.
 fn pages(commands: Command) -> Result<Vec<(String, String)>, Failure> {
     // `help` says nothing that the pages do not.
     let mut commands = commands.disable_help_subcommand(true);

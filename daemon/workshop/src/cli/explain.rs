@@ -1,4 +1,4 @@
-//! `dynocar explain`: which undeclared effect explains what the declared model leaves.
+//! `dynocar explain`: the undeclared effect that explains the residual of the declared model.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -183,7 +183,7 @@ fn report_updated(grown: &UpdatedFiles) {
     }
 }
 
-/// A bar on standard error while that is a terminal; nothing otherwise.
+/// Returns a bar on standard error while that is a terminal; nothing otherwise.
 fn progress_bar() -> ProgressBar {
     let bar = ProgressBar::new(1000);
     let template = "{bar:40} {percent:>3} %  {elapsed:>3}  {msg}";
@@ -194,7 +194,7 @@ fn progress_bar() -> ProgressBar {
     bar
 }
 
-/// The report on an explanation of the dataset at a path; `command` makes the same one.
+/// Returns the report on an explanation of the dataset at a path; `command` makes the same one.
 ///
 /// # Errors
 ///

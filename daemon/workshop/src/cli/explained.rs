@@ -1,5 +1,5 @@
-//! The answer of `dynocar explain` for people: a verdict of at most two sentences, then a list of what was
-//! found, where, how large, what it removes from the error, and what to do.
+//! The answer of `dynocar explain` for people: a verdict of at most two sentences, then for each effect its place,
+//! size, share of the error and recommended action.
 
 use dynocar_analysis::explain::answer::{Considered, EffectAnswer, ExplainAnswer};
 use dynocar_analysis::explain::report::effect as effect_words;
@@ -13,7 +13,7 @@ use dynocar::cli::text::{WIDTH, wrap};
 /// Columns of a row before its words.
 const INDENT: usize = 12;
 
-/// The answer for people.
+/// Returns the answer for people.
 pub fn text(answer: &ExplainAnswer) -> String {
     let mut text = diagnostics(&answer.diagnostics)
         + &plain(&[&answer.words.heading, &answer.words.left].map(String::as_str).concat());
@@ -47,7 +47,7 @@ fn others(answer: &ExplainAnswer) -> String {
     text
 }
 
-/// An effect, a row for each question.
+/// Returns an effect, a row for each question.
 fn found(effect: &EffectAnswer) -> String {
     let mut rows = row("what", &format!("{} ({})", words::kind_name(effect.kind), effect.kind));
     let place = effect_words::located(&effect.place);
@@ -88,7 +88,7 @@ fn limits(answer: &ExplainAnswer) -> String {
     others.into_iter().chain(caveats).chain(experiment).chain(unscored).collect()
 }
 
-/// Coefficients and errors.
+/// Returns the coefficients and errors.
 fn figures(answer: &ExplainAnswer) -> String {
     let (base, std) = (&answer.base, &answer.base.std);
     let [a, b, c] = [std.a, std.b, std.c].map(|deviation| HALF_95 * deviation);
@@ -107,7 +107,7 @@ fn figures(answer: &ExplainAnswer) -> String {
     text
 }
 
-/// A label and its words, in lines below each other.
+/// Returns a label and its words, in lines below each other.
 fn row(label: &str, words: &str) -> String {
     let lines = wrap(words, WIDTH - INDENT);
     let next = format!("\n{:INDENT$}", "");

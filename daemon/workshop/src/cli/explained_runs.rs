@@ -49,7 +49,7 @@ impl From<RunDataError> for Problem {
 }
 
 impl ExplainedRuns {
-    /// Those of the dataset at a path.
+    /// Returns those of the dataset at a path.
     ///
     /// # Errors
     ///
@@ -85,7 +85,7 @@ impl ExplainedRuns {
         Ok(ExplainedRuns { dataset, path, train, traction_only, many })
     }
 
-    /// Where they lie.
+    /// Returns where they lie.
     pub fn source(&self) -> DatasetSource<'_> {
         DatasetSource { path: &self.path, train: self.train }
     }
@@ -110,7 +110,7 @@ impl ExplainedRuns {
         })
     }
 
-    /// A run made ready for the models of an explanation, by its place.
+    /// Returns a run made ready for the models of an explanation, by its place.
     ///
     /// # Errors
     ///
@@ -131,7 +131,7 @@ impl ExplainedRuns {
         run.map(Cow::Owned).map_err(|error| self.unusable(error))
     }
 
-    /// The failure of a run that cannot be used, with what may be the matter.
+    /// Returns the failure of a run that cannot be used, with what may be the matter.
     fn unusable(&self, error: RunDataError) -> Failure {
         let RunDataError::Simulate { file, source } = error;
         let label =

@@ -75,7 +75,7 @@ pub fn execute(arguments: &FmuArguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The step that hosts take by default: the dataset's.
+/// Returns the step that hosts take by default: the dataset's.
 fn step_s(arguments: &FmuArguments) -> Result<f64, Failure> {
     let Some(dataset) = &arguments.dataset else { return Ok(STEP_DEFAULT_S) };
     let step_s = dataset::load(dataset)?.step_s();
@@ -94,7 +94,7 @@ impl From<FmuError> for Failure {
     }
 }
 
-/// The texts of the files that were named, each understood before it is packed.
+/// Returns the texts of the files that were named, each understood before it is packed.
 fn named_files(
     train: Option<&Path>,
     track: Option<&Path>,
@@ -112,13 +112,13 @@ fn named_files(
     Ok(files)
 }
 
-/// The texts of a grown train and, where it is known, its line.
+/// Returns the texts of a grown train and, where it is known, its line.
 fn files_of_updated(folder: &Path) -> Result<Vec<(ModelFile, String)>, Failure> {
     let [train, track] = [TRAIN_FILE, TRACK_FILE].map(|name| folder.join(name));
     named_files(Some(&train), track.exists().then_some(&*track))
 }
 
-/// The texts of a dataset's train and line.
+/// Returns the texts of a dataset's train and line.
 fn files_of_dataset(path: &Path) -> Result<Vec<(ModelFile, String)>, Failure> {
     let (folder, head) = dataset::open(path)?;
     let text = |path: &str| -> Result<String, DatasetError> {

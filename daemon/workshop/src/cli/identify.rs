@@ -182,14 +182,14 @@ fn named_estimators(names: &[String]) -> Result<Vec<EstimatorSettings>, Failure>
     Ok(chosen)
 }
 
-/// The names of all but some estimators.
+/// Returns the names of all but some estimators.
 fn others(estimators: &[EstimatorSettings]) -> Vec<&'static str> {
     let is_other =
         |it: &EstimatorSettings| estimators.iter().all(|other| other.kind() != it.kind());
     default_estimators().iter().filter(|it| is_other(it)).map(|it| it.kind().name()).collect()
 }
 
-/// The answer for people.
+/// Returns the answer for people.
 pub fn text(answer: &IdentifyAnswer) -> String {
     let mut text = format!("{}\n{}", answer.dataset, diagnostics(&answer.diagnostics));
     if answer.diagnostics.iter().any(|it| it.severity == Severity::Fundamental) {
@@ -229,7 +229,7 @@ pub fn text(answer: &IdentifyAnswer) -> String {
     text + "\n± is the half width of the 95 % interval; a mass is that of the last run\n"
 }
 
-/// A parameter's unit, with a space before it; empty for a ratio.
+/// Returns a parameter's unit, with a space before it; empty for a ratio.
 fn unit_of(name: &str) -> String {
     let parameter = Parameter::ALL.iter().find(|it| it.name() == name);
     match schema::unit_of(parameter.map_or(name, |it| it.full_name())) {

@@ -109,7 +109,7 @@ fn describe(
     }
 }
 
-/// The middle of a recorded mass in t.
+/// Returns the middle of a recorded mass in t.
 fn recorded_mass_t(guess: &Guess) -> Option<f64> {
     let column = guess.column(Quantity::TrainMass)?;
     let mass_t = column.unit.to_base(column.middle * column.scale) / 1000.0;

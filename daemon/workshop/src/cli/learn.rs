@@ -110,7 +110,7 @@ fn write_report(file: Option<&Path>, learner: &Learner) -> Result<(), Failure> {
     Ok(write_file(file, &page)?)
 }
 
-/// A line for each train.
+/// Returns a line for each train.
 fn lines_of(round: &LearnerRound) -> String {
     let mut text: String = round.trains.iter().map(of_train).collect();
     if round.is_stopped {

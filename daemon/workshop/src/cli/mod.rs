@@ -1,5 +1,5 @@
-//! The commands of the workshop, one file each; what `check`, `explain` and `identify` answer is there for
-//! other callers, too. A user calls them as `dynocar`'s.
+//! The commands of the workshop, one file each; `check`, `explain` and `identify` answer other callers, too. A user
+//! calls them as `dynocar`'s.
 
 pub mod brakes;
 pub mod check;
@@ -79,7 +79,7 @@ impl Command {
         }
     }
 
-    /// Where machines want the result.
+    /// Returns where machines want the result.
     fn json(&self) -> Option<&Path> {
         let json = match self {
             Command::Explain(arguments) => &arguments.json,
@@ -94,7 +94,7 @@ impl Command {
     }
 }
 
-/// The commands of `dynocar`, those of the workshop with their own options.
+/// Returns the commands of `dynocar`, those of the workshop with their own options.
 fn all_commands() -> clap::Command {
     let own = Arguments::command();
     own.get_subcommands()
@@ -104,7 +104,7 @@ fn all_commands() -> clap::Command {
         })
 }
 
-/// All commands of the workshop, with their options.
+/// Returns all commands of the workshop, with their options.
 pub fn commands() -> clap::Command {
     Arguments::command()
 }

@@ -1,4 +1,4 @@
-//! `dynocar stops`: what recorded stops say of a brake whose force nobody measured.
+//! `dynocar stops`: a brake whose force nobody measured, from recorded stops.
 
 use std::path::{Path, PathBuf};
 
@@ -54,7 +54,7 @@ impl StudyArguments {
     }
 }
 
-/// Words for datasets without a stop.
+/// Returns the words for datasets without a stop.
 pub(super) fn no_stop(dataset: &Path) -> Failure {
     Failure::Input(format!(
         "{}: no run holds a stop: a train that reached {} m/s or more and then stands",
@@ -122,7 +122,7 @@ pub fn execute(arguments: &StopsArguments) -> Result<(), Failure> {
     Ok(give(arguments.json.as_deref(), &answer, || text(&answer))?)
 }
 
-/// A table of some rows; `left` are the columns of words.
+/// Returns a table of some rows; `left` are the columns of words.
 pub(super) fn table<'t, T: 't>(
     columns: TableColumns<T>,
     left: &[usize],
@@ -190,7 +190,7 @@ const CHOSEN: TableColumns<DecelerationSpread> = &[
     ("hardest tenth above", |it| format!("{:.2}", it.deceleration_mps2.high)),
 ];
 
-/// All stops together, where there are several.
+/// Returns all stops together, where there are several.
 fn day(study: &Study) -> String {
     if study.stops.len() < 3 {
         return String::new();
@@ -266,7 +266,7 @@ fn modulated(stops: &[RecordedStop]) -> String {
     format!("\nstops with a modulated brake: deceleration in m/s² over speed\n{table}")
 }
 
-/// The friction behind the longest stop.
+/// Returns the friction behind the longest stop.
 fn friction(stops: &[RecordedStop]) -> String {
     let by_length =
         |one: &&RecordedStop, other: &&RecordedStop| one.friction.len().cmp(&other.friction.len());

@@ -16,7 +16,7 @@ pub struct Threads {
     pub(super) count: Option<usize>,
 }
 
-/// A number of threads.
+/// Returns a number of threads.
 fn count(text: &str) -> Result<usize, String> {
     let count = text.parse().ok().filter(|count| (1..=THREADS_MAX).contains(count));
     count.ok_or_else(|| format!("expected a whole number of threads from 1 to {THREADS_MAX}"))

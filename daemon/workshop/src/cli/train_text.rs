@@ -1,4 +1,4 @@
-//! The text of a first `train.toml`: what is known of a train, and a marked default for the rest.
+//! The text of a first `train.toml`: the known facts of a train, and a marked default for the rest.
 
 use clap::Args;
 use dynocar_analysis::dataset::keys::train::NAME;
@@ -113,17 +113,17 @@ pub struct TrainText {
 }
 
 impl TrainArguments {
-    /// True where the mass is no default.
+    /// Returns whether the mass is no default.
     pub fn knows_mass(&self) -> bool {
         self.mass_t.is_some()
     }
 
-    /// True where nothing is said.
+    /// Returns whether nothing is said.
     pub fn is_empty(&self) -> bool {
         *self == TrainArguments::default()
     }
 
-    /// True where a key is said.
+    /// Returns whether a key is said.
     pub fn knows(&self, key: &str) -> bool {
         ASKED.iter().zip(self.said()).any(|(asked, value)| asked.key == key && value.is_some())
     }
@@ -143,7 +143,7 @@ impl TrainArguments {
         ]
     }
 
-    /// The default of a key beside what is said, as `train.toml` writes it.
+    /// Returns the default of a key beside what is said, as `train.toml` writes it.
     ///
     /// # Errors
     ///
@@ -154,7 +154,7 @@ impl TrainArguments {
         Ok(value.map(|(_, value)| value.trim_matches('"').to_owned()).unwrap_or_default())
     }
 
-    /// The same with one key said in words.
+    /// Returns the same with one key said in words.
     ///
     /// # Errors
     ///
@@ -189,7 +189,7 @@ impl TrainArguments {
         }
     }
 
-    /// The `train.toml` by a command: what is said, else what was found, else a marked default.
+    /// Returns the `train.toml` by a command: what is said, else what was found, else a marked default.
     ///
     /// # Errors
     ///
@@ -257,7 +257,7 @@ impl TrainArguments {
     }
 }
 
-/// A line of an assignment and a comment, if any.
+/// Returns a line of an assignment and a comment, if any.
 fn noted(assignment: String, comment: &str) -> String {
     match comment {
         "" => format!("{assignment}\n"),
@@ -265,7 +265,7 @@ fn noted(assignment: String, comment: &str) -> String {
     }
 }
 
-/// A number that was converted, without the digits that only the conversion made.
+/// Returns a number that was converted, without the digits that only the conversion made.
 pub fn converted(value: f64) -> Value {
     Value::Float(format!("{value:.8e}").parse().unwrap_or(value))
 }
@@ -324,12 +324,12 @@ const RESISTANCE: &str = "
 # Resistance on level, straight track: a + b v + c v² in N for each kN of weight, v in m/s.
 ";
 
-/// Words without line breaks and other marks that would end a line.
+/// Returns the words without line breaks and other marks that would end a line.
 pub fn on_one_line(words: &str) -> String {
     words.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect()
 }
 
-/// A comment of a TOML file, in lines that begin alike.
+/// Returns a comment of a TOML file, in lines that begin alike.
 pub fn comment(indent: &str, words: &str) -> String {
     let lines = wrap(&on_one_line(words), WIDTH - indent.len());
     lines.iter().map(|line| format!("# {indent}{line}\n")).collect()

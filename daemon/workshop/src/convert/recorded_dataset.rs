@@ -39,12 +39,12 @@ impl RecordedDataset {
         self.files.push((name.into(), content));
     }
 
-    /// The names of its files.
+    /// Returns the names of its files.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.files.iter().map(|it| it.0.as_str())
     }
 
-    /// The bytes of a file as [`unpack`](super::unpack) writes it; `None` where there is none.
+    /// Returns the bytes of a file as [`unpack`](super::unpack) writes it; `None` where there is none.
     pub fn bytes(&self, path: &str) -> Option<Cow<'_, [u8]>> {
         Some(match self.file(path)? {
             FileContent::Bytes(bytes) => bytes.into(),

@@ -42,7 +42,7 @@ fn columns() -> impl Iterator<Item = &'static Field> {
     SAMPLE_FIELDS.iter().filter(|it| it.missing != Missing::SaidByOthers)
 }
 
-/// Samples as CSV, one row for each.
+/// Returns the samples as CSV, one row for each.
 pub fn to_rows<'a>(samples: impl IntoIterator<Item = &'a TrainSample>) -> String {
     let names: Vec<_> = columns().map(|it| it.layout.name).collect();
     let mut text = format!("{},{WHEEL_SLIDE}\n", names.join(","));
@@ -69,7 +69,7 @@ fn cell(field: &Field, sample: &TrainSample, words: &dyn Words) -> String {
     }
 }
 
-/// The columns of samples that mappings name, as those of a text of [`to_rows`] are read.
+/// Returns the columns of samples that mappings name, as those of a text of [`to_rows`] are read.
 pub fn columns_of_samples(samples: &[TrainSample], mappings: &[ColumnMapping]) -> RunColumns {
     let names = columns().map(|it| it.layout.name).chain([WHEEL_SLIDE]);
     let column = |name: &str| {
@@ -90,7 +90,7 @@ pub fn columns_of_samples(samples: &[TrainSample], mappings: &[ColumnMapping]) -
     RunColumns { columns: all, trains: None }
 }
 
-/// The number of a field, `NaN` where it is missing.
+/// Returns the number of a field, `NaN` where it is missing.
 fn number(field: &Field, sample: &TrainSample, words: &dyn Words) -> f64 {
     let word = words.word(0);
     match (field.missing, field.layout.type_name) {
@@ -101,13 +101,13 @@ fn number(field: &Field, sample: &TrainSample, words: &dyn Words) -> f64 {
     }
 }
 
-/// True for a text that [`to_rows`] has written.
+/// Returns true for a text that [`to_rows`] has written.
 pub fn is_rows(text: &str) -> bool {
     let header = to_rows([]);
     text.lines().next() == header.lines().next()
 }
 
-/// The samples of a text that [`to_rows`] has written; `file` names it in messages.
+/// Returns the samples of a text that [`to_rows`] has written; `file` names it in messages.
 ///
 /// # Errors
 ///

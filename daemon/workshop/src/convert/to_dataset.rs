@@ -212,8 +212,8 @@ pub fn dataset_of(
     Ok((dataset, unpacked))
 }
 
-/// True where a recording's samples are those of the dataset that is attached to it, all and no other: another tool may
-/// have cut or changed its messages.
+/// Returns whether a recording's samples are those of the dataset that is attached to it, all and no other: another
+/// tool may have cut or changed its messages.
 fn are_of(dataset: &Dataset, samples: &[TrainSample]) -> bool {
     let attached: usize = dataset.runs.iter().map(|run| run.samples.len()).sum();
     let published = dataset.runs.iter().flat_map(|run| &run.samples);
@@ -224,7 +224,7 @@ fn are_of(dataset: &Dataset, samples: &[TrainSample]) -> bool {
     attached == samples.len() && published.zip(samples).all(is_same)
 }
 
-/// The files of train and line of a dataset that is attached.
+/// Returns the files of train and line of a dataset that is attached.
 fn read_models(dataset: &RecordedDataset, manifest: &Manifest) -> Option<Models> {
     let read = |it: &FileEntry| dataset.bytes(&it.path).map(Cow::into_owned);
     Some((read(&manifest.train_file)?, manifest.track_file.as_ref().and_then(read)))

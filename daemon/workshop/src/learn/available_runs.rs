@@ -68,7 +68,7 @@ struct Lying {
     recordings: Vec<PathBuf>,
 }
 
-/// The runs of a train, the oldest first, each content once; none older than the horizon before the newest:
+/// Returns the runs of a train, the oldest first, each content once; none older than the horizon before the newest:
 /// an archive is learned from as it was recorded.
 ///
 /// # Errors
@@ -130,7 +130,7 @@ fn look(folder: &Path, depth: usize, lying: &mut Lying) -> io::Result<()> {
     Ok(())
 }
 
-/// True for what is of a train: all where there is one train only, else what lies in a folder named by
+/// Returns true for what is of a train: all where there is one train only, else what lies in a folder named by
 /// the train's number, as `7` or `train=7`; a recording outside of such may hold any train.
 fn is_of(train: TrainId, path: &Path, places: Places) -> bool {
     let inside = path.strip_prefix(places.runs).unwrap_or(path);
@@ -145,7 +145,7 @@ fn is_of(train: TrainId, path: &Path, places: Places) -> bool {
     }
 }
 
-/// The runs of a dataset; none of one that cannot be read, which is reported once.
+/// Returns the runs of a dataset; none of one that cannot be read, which is reported once.
 fn runs_in(
     folder: &Path,
     name: &str,

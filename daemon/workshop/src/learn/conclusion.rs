@@ -113,7 +113,7 @@ impl Conclusion<'_> {
         Ok(explained)
     }
 
-    /// The model that an explanation makes; `None` where no effect of the train or the line was found, or
+    /// Returns the model that an explanation makes; `None` where no effect of the train or the line was found, or
     /// the runs held out are not predicted better.
     fn candidate(&self, grown: UpdatedTexts) -> Result<Option<NewModel>, LearnError> {
         let &Conclusion { models, in_force, pool, explanation, now, .. } = self;
@@ -180,7 +180,7 @@ fn put_event(models: &TrainModels, mut event: MaintenanceEvent) -> Result<Option
     Ok(Some(number))
 }
 
-/// The files of the model in force and the runs.
+/// Returns the files of the model in force and the runs.
 fn digests(model: &Path, pool: &Pool) -> Vec<FileDigest> {
     let model_files = [TRAIN_FILE, TRACK_FILE].map(|name| model.join(name));
     let of_model = model_files.iter().filter(|path| path.exists()).map(|path| {

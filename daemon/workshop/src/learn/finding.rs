@@ -16,12 +16,12 @@ use super::pool::Pool;
 use dynocar::models::origin::{EventWindow, HeldOutError};
 use dynocar::models::{FoundEffect, MaintenanceEvent, ModelFigure, ModelHash, UtcSecond};
 
-/// Whether a kind acts in the runs in which it is found and in no others, wherever the answer names none.
+/// Returns whether a kind acts in the runs in which it is found and in no others, wherever the answer names none.
 fn is_passing(kind: &str) -> bool {
     EffectKind::from_name(kind).is_some_and(|kind| policy_of(kind).is_passing)
 }
 
-/// An effect as records hold it.
+/// Returns an effect as records hold it.
 pub fn found_effect(effect: &EffectAnswer) -> FoundEffect {
     FoundEffect {
         kind: effect.kind.into(),
@@ -30,7 +30,7 @@ pub fn found_effect(effect: &EffectAnswer) -> FoundEffect {
     }
 }
 
-/// The numbers of an effect that have a standard deviation, by name; those of a list by place or run.
+/// Returns the numbers of an effect that have a standard deviation, by name; those of a list by place or run.
 fn figures(effect: &EffectAnswer) -> BTreeMap<String, ModelFigure> {
     let mut figures = BTreeMap::new();
     for (name, value) in &effect.parameters {
@@ -64,7 +64,7 @@ fn listed(what: &str, name: &str, list: impl Iterator<Item = f64>) -> Vec<(Strin
     list.enumerate().map(|(k, number)| (format!("{what}{name}[{k}]"), number)).collect()
 }
 
-/// True for an effect of certain runs or windows of time, which no file of a train or a line can express.
+/// Returns true for an effect of certain runs or windows of time, which no file of a train or a line can express.
 pub fn is_event(effect: &EffectAnswer, not_expressed: &[String]) -> bool {
     let place = &effect.place;
     let by_run = |value: &ParameterValue| matches!(value, ParameterValue::ByRun(_));
@@ -75,7 +75,7 @@ pub fn is_event(effect: &EffectAnswer, not_expressed: &[String]) -> bool {
             || effect.parameters.values().any(by_run))
 }
 
-/// True for an event that is reported at once or is over: other kinds that act in the newest of the fit runs
+/// Returns true for an event that is reported at once or is over: other kinds that act in the newest of the fit runs
 /// may be about to last, and are looked at again when there are newer ones.
 pub fn is_to_be_reported(event: &MaintenanceEvent, explanation: &Explanation) -> bool {
     let newest = explanation.problem.runs.last().map(|run| run.file.as_str());
@@ -83,13 +83,13 @@ pub fn is_to_be_reported(event: &MaintenanceEvent, explanation: &Explanation) ->
     is_passing(&event.kind) || !acts_in_newest
 }
 
-/// The errors on the runs held out, where the model is better on them.
+/// Returns the errors on the runs held out, where the model is better on them.
 pub fn improvement(answer: &ExplainAnswer) -> Option<HeldOutError> {
     let (before_mps, after_mps) = (answer.rmse_before?, answer.rmse_after?);
     (after_mps < before_mps).then_some(HeldOutError { before_mps, after_mps })
 }
 
-/// An event of the runs that a pool holds; `model` was in force.
+/// Returns an event of the runs that a pool holds; `model` was in force.
 pub fn event(
     effect: &EffectAnswer,
     pool: &Pool,
@@ -122,7 +122,7 @@ pub fn event(
     event
 }
 
-/// The windows of an effect; whole runs where only these are known, all fit runs where not even they are.
+/// Returns the windows of an effect; whole runs where only these are known, all fit runs where not even they are.
 fn windows(effect: &EffectAnswer, pool: &Pool, explanation: &Explanation) -> Vec<EventWindow> {
     let sha256_of = |name: &str| {
         pool.runs
@@ -160,7 +160,7 @@ fn whole(name: &str, dataset: &Dataset, sha256: String) -> Option<EventWindow> {
     })
 }
 
-/// An event in a sentence for people.
+/// Returns an event in a sentence for people.
 pub fn sentence(event: &MaintenanceEvent) -> String {
     let kind = kind_name(&event.kind);
     let mut runs: Vec<&str> = event.windows.iter().map(|window| &window.run[..]).collect();

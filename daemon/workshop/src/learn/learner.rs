@@ -87,7 +87,7 @@ pub enum RoundOutcome {
 struct Stopped;
 
 impl Learner {
-    /// The learner of a store; there is one for each.
+    /// Returns the learner of a store; there is one for each.
     ///
     /// # Errors
     ///

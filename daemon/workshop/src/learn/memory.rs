@@ -49,7 +49,7 @@ pub struct OpenQuestion {
 }
 
 impl OpenQuestion {
-    /// True for the same question, asked at another time.
+    /// Returns true for the same question, asked at another time.
     pub fn is_same_as(&self, other: &OpenQuestion) -> bool {
         (self.train, self.model, &self.verdict, &self.kinds)
             == (other.train, other.model, &other.verdict, &other.kinds)
@@ -74,7 +74,7 @@ pub struct LearnerMemory {
 }
 
 impl LearnerMemory {
-    /// The memory in a folder. One that is damaged is reported and begun anew.
+    /// Returns the memory in a folder. One that is damaged is reported and begun anew.
     pub fn load(folder: &Path) -> Self {
         let path = folder.join(FILE);
         let read = |text: String| {
@@ -122,7 +122,7 @@ impl LearnerMemory {
         is_new
     }
 
-    /// The questions of a train.
+    /// Returns the questions of a train.
     pub fn open_of(&self, train: TrainId) -> impl Iterator<Item = &OpenQuestion> {
         self.open.iter().filter(move |it| it.train == train.0)
     }

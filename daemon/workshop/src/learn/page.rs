@@ -22,7 +22,7 @@ use crate::report::plots::series::{self, DailyErrors};
 use crate::report::plots::{PlotError, figure, wide_and_narrow};
 use crate::report::provenance::Provenance;
 
-/// The page on what a learner's store holds.
+/// Returns the page on what a learner's store holds.
 ///
 /// # Errors
 ///
@@ -147,7 +147,7 @@ fn push_tree<'h>(
     }
 }
 
-/// A time to the minute.
+/// Returns a time to the minute.
 fn minute(moment: UtcSecond) -> String {
     moment.to_string()[..16].replace('T', " ")
 }
@@ -209,7 +209,7 @@ fn of_questions(open: &[&OpenQuestion]) -> String {
 
 const DAY_S: u64 = 86_400;
 
-/// The plot, as HTML; empty where nothing was measured.
+/// Returns the plot, as HTML; empty where nothing was measured.
 ///
 /// # Errors
 ///
@@ -248,7 +248,7 @@ fn errors_by_day(history: &ModelHistory, trials: &TrialRecord) -> Result<String,
     Ok(figure("trace", caption, &key, &plots))
 }
 
-/// The model that the decisions had put in force at the end of a day; `None` for what was declared.
+/// Returns the model that the decisions had put in force at the end of a day; `None` for what was declared.
 fn in_force_on(history: &ModelHistory, number: i64) -> Option<ModelHash> {
     let end_s = (number + 1) as u64 * DAY_S;
     let before = history.decisions.iter().map(|(_, it)| it).filter(|it| it.at.unix_s < end_s);

@@ -61,7 +61,7 @@ pub struct Pool {
     pub runs: Vec<FoundRun>,
 }
 
-/// The choices of runs that are explained, one after the other until one shows an effect: the recent ones, in
+/// Returns the choices of runs that are explained, one after the other until one shows an effect: the recent ones, in
 /// which something new shows undiluted, then these with a sample of all before.
 pub fn choices(runs: &[FoundRun], bounds: &Bounds) -> Vec<Vec<FoundRun>> {
     let Some(newest) = runs.last() else { return Vec::new() };
@@ -141,7 +141,7 @@ pub fn read(
 }
 
 impl Pool {
-    /// The pool with its runs numbered, the last ones held out; `None` where fewer than two are left.
+    /// Returns the pool with its runs numbered, the last ones held out; `None` where fewer than two are left.
     pub fn in_order(mut self) -> Option<Self> {
         let count = self.runs.len();
         if count < 2 {
@@ -157,7 +157,7 @@ impl Pool {
         Some(self)
     }
 
-    /// The pool without a run; `None` where too few are left.
+    /// Returns the pool without a run; `None` where too few are left.
     pub fn without(mut self, name: &str) -> Option<Self> {
         let index = self.runs.iter().position(|run| run.name == name)?;
         self.runs.remove(index);
@@ -207,7 +207,7 @@ pub struct Overlay<'a> {
 }
 
 impl<'a> Overlay<'a> {
-    /// The dataset in a folder with a model.
+    /// Returns the dataset in a folder with a model.
     ///
     /// # Errors
     ///
@@ -216,7 +216,7 @@ impl<'a> Overlay<'a> {
         Ok(Overlay { dataset: FilesOfDataset::at(folder)?, model })
     }
 
-    /// The description, which names the files of the model.
+    /// Returns the description, which names the files of the model.
     fn described(&self, text: String) -> String {
         let Ok(mut table) = text.parse::<Table>() else { return text };
         name_model(&mut table, TRAIN_FILE, self.model.track.as_ref().map(|_| TRACK_FILE));

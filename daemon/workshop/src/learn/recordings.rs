@@ -30,7 +30,7 @@ pub struct RecordingSource {
     pub recorded: UtcSecond,
 }
 
-/// True for a recording that is no longer written.
+/// Returns true for a recording that is no longer written.
 pub fn is_finished(path: &Path) -> bool {
     let end = || -> io::Result<Vec<u8>> {
         let mut file = File::open(path)?;
@@ -81,8 +81,8 @@ pub fn take_up(
         .map_err(failed("unpacking a recording into the folder"))
 }
 
-/// The folders of the unpacked recordings in one, the oldest first; the oldest go until the rest takes no more than
-/// it may.
+/// Returns the folders of the unpacked recordings in one, the oldest first; the oldest go until the rest takes no more
+/// than it may.
 pub fn unpacked_in(folder: &Path) -> Vec<(PathBuf, RecordingSource)> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let mut found: Vec<(PathBuf, RecordingSource)> = Vec::new();

@@ -1,4 +1,4 @@
-//! When there is a round: on a new suspicion, at an hour, and at the start.
+//! The schedule of rounds: on a new suspicion, at an hour, and at the start.
 
 use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -46,7 +46,7 @@ impl FromStr for TimeOfDay {
 }
 
 impl TimeOfDay {
-    /// The next instant at which it is that time.
+    /// Returns the next instant at which it is that time.
     fn after(self, instant: SystemTime) -> SystemTime {
         let now_s = instant.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
         let today_s = now_s / DAY_S * DAY_S + self.second;
@@ -61,7 +61,7 @@ struct Daily {
 }
 
 impl Daily {
-    /// True once a day. A clock that is set forward over the time of the day reaches it, and one that is set
+    /// Returns whether a day. A clock that is set forward over the time of the day reaches it, and one that is set
     /// back reaches it again.
     fn is_due(&mut self, now: SystemTime) -> bool {
         let looked = std::mem::replace(&mut self.looked, now);
@@ -77,12 +77,12 @@ pub struct Suspicions {
 }
 
 impl Suspicions {
-    /// Those of a train.
+    /// Returns those of a train.
     pub fn new(observed: ObservedTrain) -> Self {
         Suspicions { observed, known: None }
     }
 
-    /// True when another effect is suspected than before.
+    /// Returns whether another effect is suspected than before.
     fn is_new(&mut self) -> bool {
         let changes = self.observed.poll().into_iter();
         let raised = changes.filter(|it| it.kind == EventKind::SuspicionRaised);

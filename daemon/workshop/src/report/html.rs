@@ -3,7 +3,7 @@
 use dynocar_analysis::explain::report::IntervalEstimate;
 use dynocar_model::words::{self, number};
 
-/// A part of a page under an anchor; title and body are HTML.
+/// Returns a part of a page under an anchor; title and body are HTML.
 pub fn section(id: &str, title: &str, body: &str) -> String {
     format!(
         "<section id=\"{id}\" aria-labelledby=\"{id}-title\">\n\
@@ -11,7 +11,7 @@ pub fn section(id: &str, title: &str, body: &str) -> String {
     )
 }
 
-/// The key to the colours of a plot.
+/// Returns the key to the colours of a plot.
 pub fn legend(entries: &[(&str, &str)]) -> String {
     let items: String = entries
         .iter()
@@ -30,7 +30,7 @@ pub fn chance(p_value: f64, decimals: usize) -> String {
     if p_value < 1e-6 { "&lt; 10⁻⁶".into() } else { format!("{p_value:.decimals$e}") }
 }
 
-/// Text from outside, harmless within elements and quoted attributes.
+/// Returns the text from outside, harmless within elements and quoted attributes.
 pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for letter in text.chars() {
@@ -65,12 +65,12 @@ pub type TableColumn<'c, T> = (&'c str, ColumnAlignment, &'c dyn Fn(&T) -> Strin
 /// Head and cells of columns that are shown as text and as HTML.
 pub type TableColumns<'c, T> = &'c [(&'c str, fn(&T) -> String)];
 
-/// A table, which scrolls within itself where the page is narrower; the caption is plain text.
+/// Returns a table, which scrolls within itself where the page is narrower; the caption is plain text.
 pub fn table<T>(caption: &str, columns: &[TableColumn<'_, T>], rows: &[T]) -> String {
     marked_table(caption, columns, rows, |_| false)
 }
 
-/// A table in which some rows stand out.
+/// Returns a table in which some rows stand out.
 pub fn marked_table<T>(
     caption: &str,
     columns: &[TableColumn<'_, T>],
@@ -108,7 +108,7 @@ fn class(column: ColumnAlignment) -> &'static str {
     }
 }
 
-/// A value above its 95 % interval.
+/// Returns a value above its 95 % interval.
 pub fn estimate(estimate: &IntervalEstimate) -> String {
     let half = estimate.interval.map(|[low, high]| 0.5 * (high - low));
     let value = number(estimate.value, half);
@@ -121,7 +121,7 @@ pub fn estimate(estimate: &IntervalEstimate) -> String {
     }
 }
 
-/// A share in percent above its interval.
+/// Returns a share in percent above its interval.
 pub fn percent(share: &IntervalEstimate) -> String {
     let shown = |value: f64| words::percent(value, share.interval);
     match share.interval {
@@ -133,7 +133,7 @@ pub fn percent(share: &IntervalEstimate) -> String {
     }
 }
 
-/// A number's text with a true minus, and none before zero.
+/// Returns a number's text with a true minus, and none before zero.
 pub fn minus(text: &str) -> String {
     let digits = text.trim_start_matches('-');
     if digits.chars().all(|c| matches!(c, '0' | '.' | ' ' | '%')) {
@@ -142,12 +142,12 @@ pub fn minus(text: &str) -> String {
     text.replacen('-', "−", 1)
 }
 
-/// A count, a dash for none.
+/// Returns a count, a dash for none.
 pub fn count(count: usize) -> String {
     if count == 0 { "–".into() } else { grouped(count) }
 }
 
-/// A whole number with thin spaces between its thousands.
+/// Returns a whole number with thin spaces between its thousands.
 pub fn grouped(count: usize) -> String {
     let digits = count.to_string();
     let mut text = String::new();

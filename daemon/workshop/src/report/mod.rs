@@ -7,7 +7,7 @@
 //! - [`sections`]: its parts
 //! - [`plots`]: the plots, as SVG text
 //! - [`mod@images`]: the same as files of their own
-//! - [`html`]: what pages are made of: tables, sections, numbers
+//! - [`html`]: parts of pages: tables, sections, numbers
 //! - [`provenance`]: command, versions, content hash
 //! - `style.css`: the style, for wide and narrow, light and dark, screen and paper
 //! - `plots.js`: values at the pointer and zoom
@@ -31,7 +31,7 @@ use provenance::Provenance;
 /// How every page begins.
 pub const PAGE_MARK: &str = "<!DOCTYPE html>";
 
-/// The page on an explanation of a dataset.
+/// Returns the page on an explanation of a dataset.
 ///
 /// # Errors
 ///

@@ -1,4 +1,5 @@
-//! The page from top to bottom, and what every page has, for the survey's and the learner's too: head and policy.
+//! The page from top to bottom, and the common parts of every page, the survey's and the learner's too: head and
+//! policy.
 
 use std::fmt::Write as _;
 
@@ -21,7 +22,7 @@ use crate::run_facts::tonnes;
 const STYLE: &str = include_str!("style.css");
 const SCRIPT: &str = include_str!("plots.js");
 
-/// A whole page; title, header and main part are HTML.
+/// Returns a whole page; title, header and main part are HTML.
 ///
 /// Its policy lets it load nothing, and run no script but ours.
 pub fn document(title: &str, header: &str, main: &str, made: &Provenance) -> String {
@@ -41,7 +42,7 @@ pub fn document(title: &str, header: &str, main: &str, made: &Provenance) -> Str
     )
 }
 
-/// The page.
+/// Returns the page.
 ///
 /// # Errors
 ///
@@ -166,7 +167,7 @@ fn verdict(subject: &Subject) -> String {
     html + "</section>\n"
 }
 
-/// The figures that matter, large.
+/// Returns the figures that matter, large.
 fn figures(subject: &Subject) -> String {
     let Some((role, judged)) = subject.data.errors.judged() else { return String::new() };
     let runs = if role == Role::Holdout { "holdout runs" } else { "fit runs" };
@@ -192,11 +193,7 @@ fn figures(subject: &Subject) -> String {
         ));
         let p_value = subject.explanation.answer.effects.iter().map(|effect| effect.p_value);
         let worst = p_value.fold(0.0, f64::max);
-        list.push((
-            chance(worst, 2),
-            effect::CHANCE,
-            "for the whole search".into(),
-        ));
+        list.push((chance(worst, 2), effect::CHANCE, "for the whole search".into()));
     }
     let mut html = String::from("<dl class=\"figures\">\n");
     for (value, what, more) in list {

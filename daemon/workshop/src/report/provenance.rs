@@ -1,4 +1,4 @@
-//! Where a report comes from: command, versions, content of the dataset.
+//! Provenance of a report: command, versions, content of the dataset.
 
 use std::time::SystemTime;
 
@@ -64,7 +64,7 @@ impl Provenance {
         }
     }
 
-    /// A shell command that gives the same hash in the dataset's folder.
+    /// Returns a shell command that gives the same hash in the dataset's folder.
     pub fn check_command(&self) -> String {
         let paths: Vec<String> = self.files.iter().map(|file| for_shell(&file.path)).collect();
         format!("sha256sum {} | sha256sum", paths.join(" "))
@@ -90,18 +90,18 @@ pub fn hex(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// The command line of this process, as one would type it.
+/// Returns the command line of this process, as one would type it.
 pub fn own_command_line() -> String {
     command_line(std::env::args().skip(1))
 }
 
-/// A command line of the program with these arguments, as one would type it.
+/// Returns a command line of the program with these arguments, as one would type it.
 pub fn command_line(arguments: impl IntoIterator<Item = String>) -> String {
     let words = arguments.into_iter().map(|argument| for_shell(&argument));
     std::iter::once("dynocar".to_string()).chain(words).collect::<Vec<_>>().join(" ")
 }
 
-/// A word, or a path, as a shell takes it.
+/// Returns a word, or a path, as a shell takes it.
 pub fn for_shell(word: &str) -> String {
     let is_plain = |letter: char| letter.is_alphanumeric() || "-_./=:,+@%".contains(letter);
     if !word.is_empty() && word.chars().all(is_plain) {

@@ -16,12 +16,12 @@ pub struct Subject<'a> {
 }
 
 impl<'a> Subject<'a> {
-    /// An explanation of a dataset.
+    /// Returns an explanation of a dataset.
     pub fn of(dataset: &'a Dataset, explanation: &'a Explanation) -> Self {
         Subject { dataset, explanation, data: ReportData::of(dataset, explanation) }
     }
 
-    /// True when an effect was added to the model, so that there is an 'after'.
+    /// Returns whether an effect was added to the model, so that there is an 'after'.
     pub fn has_effect(&self) -> bool {
         !self.explanation.answer.effects.is_empty()
     }
@@ -31,13 +31,13 @@ impl<'a> Subject<'a> {
         if self.has_effect() { "before" } else { "declared model, a, b, c refitted" }
     }
 
-    /// Number of a run in the dataset, from 1; 0 for one that is not there.
+    /// Returns the number of a run in the dataset, from 1; 0 for one that is not there.
     pub fn number(&self, file: &str) -> usize {
         let runs = &self.dataset.runs;
         runs.iter().find(|run| run.file == file).map_or(0, |run| run.number as usize)
     }
 
-    /// The errors of the runs of a role, with their numbers.
+    /// Returns the errors of the runs of a role, with their numbers.
     pub fn errors_of(&self, role: Role) -> Vec<(usize, &RunErrors)> {
         let own = self.data.errors.by_run.iter().filter(|run| run.role == role);
         own.map(|run| (self.number(&run.file), run)).collect()

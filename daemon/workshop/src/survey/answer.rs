@@ -96,7 +96,7 @@ pub struct LearnedAnswer {
 }
 
 impl SurveyAnswer {
-    /// The answer to a survey.
+    /// Returns the answer to a survey.
     pub fn of(dataset: &Dataset, vehicle: &Vehicle, survey: &Survey) -> Self {
         let left_out = |number: usize| {
             let profile = survey.profile.as_ref()?;

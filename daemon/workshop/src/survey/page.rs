@@ -20,7 +20,7 @@ use crate::report::provenance::Provenance;
 /// Width and height of the map.
 const SIZE: (f64, f64) = (980.0, 420.0);
 
-/// The page: map, profile with its band, stops, passes, what was not used and what stays open.
+/// Returns the page: map, profile with its band, stops, passes, what was not used and what stays open.
 ///
 /// # Errors
 ///
@@ -125,7 +125,7 @@ fn map(survey: &Survey, answer: &SurveyAnswer) -> String {
         + "Dots: stops, with their chainage when pointed at.</p>\n"
 }
 
-/// A bar of a round length, for a map of some m for each unit of the drawing.
+/// Returns a bar of a round length, for a map of some m for each unit of the drawing.
 fn scale_bar(span: f64) -> String {
     let most_m = 0.25 * SIZE.0 * span;
     let decade_m = 10f64.powf(most_m.log10().floor());

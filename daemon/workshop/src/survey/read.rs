@@ -15,7 +15,7 @@ use dynocar_analysis::survey::{KnownLine, Survey, SurveyError, Vehicle};
 use dynocar_model::track::Track;
 use dynocar_shared::SampleField;
 
-/// A run's rows in order of time, as numbers of its samples.
+/// Returns a run's rows in order of time, as numbers of its samples.
 pub fn rows_in_order(run: &Run) -> Vec<usize> {
     let mut last_ns = i64::MIN;
     let mut rows = Vec::with_capacity(run.samples.len());
@@ -28,7 +28,7 @@ pub fn rows_in_order(run: &Run) -> Vec<usize> {
     rows
 }
 
-/// The runs of a dataset as recordings.
+/// Returns the runs of a dataset as recordings.
 pub fn recordings(dataset: &Dataset) -> Vec<RawRecording> {
     dataset.runs.iter().map(|run| recording(dataset, run)).collect()
 }
@@ -106,7 +106,7 @@ pub fn vehicle(dataset: &Dataset) -> Vehicle {
     }
 }
 
-/// A line surveyed before, from its `track.toml` and the alignments beside it.
+/// Returns a line surveyed before, from its `track.toml` and the alignments beside it.
 ///
 /// # Errors
 ///
@@ -153,7 +153,7 @@ pub fn known_line(path: &Path) -> Result<(KnownLine, Track), SurveyFailure> {
     Ok((KnownLine { plane, alignments }, track))
 }
 
-/// Rows of chainage in m, latitude and longitude in degrees.
+/// Returns the rows of chainage in m, latitude and longitude in degrees.
 fn alignment_points(path: &Path) -> Result<Vec<[f64; 3]>, String> {
     let text = read_text(path).map_err(|problem| problem.to_string())?;
     let mut points = Vec::new();

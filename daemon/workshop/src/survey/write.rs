@@ -33,7 +33,7 @@ const MARK: &str = "# By `dynocar survey`";
 /// A profile reaches beyond its alignment by this many m.
 const BEYOND_M: f64 = 60.0;
 
-/// The file of a trip, from its number from 0.
+/// Returns the file of a trip, from its number from 0.
 pub fn trip_file(number: usize) -> String {
     format!("runs/{:03}.csv", number + 1)
 }
@@ -75,7 +75,7 @@ pub fn write(material: &Material, folder: &Path) -> Result<Vec<PathBuf>, SurveyF
     written.collect()
 }
 
-/// A known line with its alignments, under their own names.
+/// Returns a known line with its alignments, under their own names.
 fn copied_line(line: &Path) -> Result<Vec<(String, String)>, SurveyFailure> {
     let read = |path: &Path| {
         dynocar::dataset::read_text(path).map_err(|problem| SurveyFailure::SurveyedLine {
@@ -91,7 +91,7 @@ fn copied_line(line: &Path) -> Result<Vec<(String, String)>, SurveyFailure> {
     Ok(files)
 }
 
-/// The declared train with what was learned.
+/// Returns the declared train with what was learned.
 fn train_toml(material: &Material) -> Result<String, SurveyFailure> {
     let (files, head) = open(material.source)?;
     let path = &head.manifest.train_file.path;
@@ -232,7 +232,7 @@ fn alignment(survey: &Survey, direction: i8) -> String {
     text
 }
 
-/// Seconds by which forces are stamped late and are moved, 0 for none.
+/// Returns the seconds by which forces are stamped late and are moved, 0 for none.
 pub fn late_s(survey: &Survey) -> f64 {
     let Some(profile) = &survey.profile else { return 0.0 };
     let (late_s, std_s) =
@@ -298,7 +298,7 @@ const fn column(
     TripColumn { quantity, unit, decimals, source }
 }
 
-/// The columns of a dataset's trips.
+/// Returns the columns of a dataset's trips.
 pub fn columns(dataset: &Dataset) -> Vec<TripColumn> {
     let any = |is_there: &dyn Fn(&Run) -> bool| dataset.runs.iter().any(is_there);
     let has = |field: SampleField| any(&|run| run.samples.iter().any(|it| it.get(field).is_some()));
@@ -316,12 +316,12 @@ pub fn columns(dataset: &Dataset) -> Vec<TripColumn> {
     COLUMNS.into_iter().filter(is_there).collect()
 }
 
-/// True where the brake force is more than what the pressure says.
+/// Returns whether the brake force is more than what the pressure says.
 fn has_own_brake(run: &Run) -> bool {
     !matches!(run.brake_source, ForceSource::None | ForceSource::Pressure)
 }
 
-/// The text of a trip's file.
+/// Returns the text of a trip's file.
 pub fn run_csv(material: &Material, trip: &Trip) -> String {
     let columns = columns(material.dataset);
     let run = &material.dataset.runs[trip.recording];
@@ -369,7 +369,7 @@ pub fn run_csv(material: &Material, trip: &Trip) -> String {
     text
 }
 
-/// The mass of a row with what was learned of it.
+/// Returns the mass of a row with what was learned of it.
 fn mass_kg(material: &Material, run: &Run, row: usize) -> Option<f64> {
     let declared_kg = run.samples[row].get(SampleField::Mass)?;
     let Some(profile) = &material.survey.profile else { return Some(declared_kg) };

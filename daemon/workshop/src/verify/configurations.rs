@@ -68,7 +68,7 @@ impl Configurations {
         Ok(Configurations { seen })
     }
 
-    /// The configuration of a daemon that started at a moment of the monotonic clock, and whether it
+    /// Returns the configuration of a daemon that started at a moment of the monotonic clock, and whether it
     /// keeps states: the first that was seen after that moment.
     pub fn of_epoch(&self, epoch: u64) -> (&DaemonConfig, bool) {
         let start_ns = i64::try_from(epoch).unwrap_or(i64::MAX);

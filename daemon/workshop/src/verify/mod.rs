@@ -23,7 +23,7 @@ pub use pipelines::{ComparisonOutcome, SnapshotDifference, Verified, verify};
 /// Fields of a snapshot that are stamps of the daemon's clock and are not computed from samples.
 pub const STAMPS: [&str; 3] = ["epoch", "published_ns", "vouched_ns"];
 
-/// The answer for people.
+/// Returns the answer for people.
 pub fn text(verified: &[Verified]) -> String {
     let mut text = String::new();
     let mut epoch = None;

@@ -161,7 +161,7 @@ fn compare(
     (recorded.len(), ComparisonOutcome::Same)
 }
 
-/// The index of the first sample that the pipeline took: a snapshot's `sequence` says how many it had
+/// Returns the index of the first sample that the pipeline took: a snapshot's `sequence` says how many it had
 /// taken by the newest.
 fn start_of(
     samples: &[&TrainSample],
@@ -186,7 +186,7 @@ fn start_of(
     }
 }
 
-/// How many samples the pipeline counted as lost before its first.
+/// Returns how many samples the pipeline counted as lost before its first.
 fn lost_before(
     samples: &[&TrainSample],
     first: Option<&ParameterSnapshot>,
@@ -204,7 +204,7 @@ fn lost_before(
     Some(first.samples_lost.saturating_sub(pipeline.snapshot().samples_lost))
 }
 
-/// The first field, but for stamps, that is not the same to the bit.
+/// Returns the first field, but for stamps, that is not the same to the bit.
 fn difference(
     recorded: &ParameterSnapshot,
     computed: &ParameterSnapshot,

@@ -1,4 +1,4 @@
-//! How far a train's samples have been counted: a page that its controllers and its daemon share.
+//! The count of a train's samples: a page that its controllers and its daemon share.
 //!
 //! The controller writes the number of each sample before and after it hands it to the channel; the
 //! next controller counts on from there. So a daemon knows from which number on it could have seen
@@ -112,12 +112,12 @@ impl SampleCount {
         self.page().published.0.sent.store(sequence, Release);
     }
 
-    /// The greatest number that a controller has begun to publish; the next one counts on from it.
+    /// Returns the greatest number that a controller has begun to publish; the next one counts on from it.
     pub fn begun(&self) -> u64 {
         number(&self.page().published.0.begun)
     }
 
-    /// The greatest number that a controller has published: who begins to receive now misses what
+    /// Returns the greatest number that a controller has published: who begins to receive now misses what
     /// was published up to it, and could see what comes after it.
     pub fn sent(&self) -> u64 {
         number(&self.page().published.0.sent)
@@ -130,7 +130,7 @@ impl SampleCount {
         served.pipelines.store(pipelines as u64, Release);
     }
 
-    /// Pipelines of the newest daemon.
+    /// Returns the pipelines of the newest daemon.
     pub fn pipelines(&self) -> usize {
         number(&self.page().served.0.pipelines) as usize
     }
@@ -140,7 +140,7 @@ impl SampleCount {
         self.page().served.0.ended.store(sequence, Release);
     }
 
-    /// The last number, once everybody is gone who published a sample.
+    /// Returns the last number, once everybody is gone who published a sample.
     pub fn ended(&self) -> Option<u64> {
         let ended = number(&self.page().served.0.ended);
         (ended == self.begun()).then_some(ended)
@@ -153,7 +153,7 @@ impl SampleCount {
         }
     }
 
-    /// Samples published that the slowest pipeline thread has not taken; `None` where there never
+    /// Returns the samples published that the slowest pipeline thread has not taken; `None` where there never
     /// was one.
     pub fn untaken(&self) -> Option<u64> {
         let page = self.page();

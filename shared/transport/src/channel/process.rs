@@ -1,4 +1,4 @@
-//! Whose ends these are: a child made by `fork()` has a copy of its parent's memory, not its ends.
+//! The process that owns an end: a child made by `fork()` has a copy of its parent's memory, not its ends.
 //!
 //! A page that the kernel wipes in a child marks the process, so that an end knows it without a system
 //! call. In a child an end is neither used nor dropped: dropping it would take the parent's away. The
@@ -62,7 +62,7 @@ extern "C" fn forget_parent() {
     }
 }
 
-/// This process's mark, made when it opens its first end; times make marks that no other process has.
+/// Returns this process's mark, made when it opens its first end; times make marks that no other process has.
 fn mark_of_this_process() -> u64 {
     MARK_IS_MADE.call_once(make_mark);
     let fresh = monotonic_now_ns().unsigned_abs() | 1;
@@ -77,7 +77,7 @@ fn mark_of_this_process() -> u64 {
 pub struct Owner(u64);
 
 impl Owner {
-    /// This process.
+    /// Returns this process.
     pub fn current() -> Self {
         Owner(mark_of_this_process())
     }
@@ -105,7 +105,7 @@ impl<T> Owned<T> {
         Owned { value: ManuallyDrop::new(value), owner: Owner::current() }
     }
 
-    /// The value, unless this is a child that was forked since it was made.
+    /// Returns the value, unless this is a child that was forked since it was made.
     #[inline]
     pub(crate) fn own(&self) -> Option<&T> {
         self.owner.is_this_process().then_some(&self.value)
@@ -144,7 +144,7 @@ impl LockedFile {
         LockedFile(file)
     }
 
-    /// The file, unless this is a child.
+    /// Returns the file, unless this is a child.
     pub(crate) fn own(&self) -> Option<&File> {
         self.0.own()
     }

@@ -74,7 +74,7 @@ impl Entrance {
         }
     }
 
-    /// The processes that use a service, by their programs.
+    /// Returns the processes that use a service, by their programs.
     fn strangers_of(&self, name: &ServiceName) -> String {
         let pattern = MessagingPattern::PublishSubscribe;
         let details = ipc::Service::details(name, self.node.get().config(), pattern);
@@ -91,7 +91,7 @@ impl Entrance {
     }
 }
 
-/// True where the service was made with other settings than ours.
+/// Returns whether the service was made with other settings than ours.
 fn is_of_a_stranger(error: &PublishSubscribeOpenOrCreateError) -> bool {
     use PublishSubscribeOpenError as Open;
     let PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(error) = error else {
@@ -111,7 +111,7 @@ fn is_of_a_stranger(error: &PublishSubscribeOpenOrCreateError) -> bool {
     )
 }
 
-/// The refusal where every place of a channel is taken.
+/// Returns the refusal where every place of a channel is taken.
 pub(super) fn no_place_left<T: Payload>(train: TrainId, limit: usize) -> ChannelError {
     ChannelError::NoPlaceLeft { train, channel: T::CHANNEL.name(), limit }
 }
@@ -123,7 +123,7 @@ fn service_name<T: Payload>(train: TrainId) -> String {
     name
 }
 
-/// True for what passes by itself while another process makes or removes the service.
+/// Returns true for what passes by itself while another process makes or removes the service.
 fn is_settling(error: &PublishSubscribeOpenOrCreateError) -> bool {
     use PublishSubscribeOpenOrCreateError as Error;
     match error {
@@ -145,7 +145,7 @@ fn is_settling(error: &PublishSubscribeOpenOrCreateError) -> bool {
     }
 }
 
-/// The transport's refusal with what a user can do about it, where we know it.
+/// Returns the transport's refusal with what a user can do about it, where we know it.
 fn explain(error: &PublishSubscribeOpenOrCreateError) -> String {
     use PublishSubscribeOpenError as Open;
     use PublishSubscribeOpenOrCreateError as Error;

@@ -1,4 +1,4 @@
-//! Who uses the transport of a run-time directory, to tidy up after the last of them.
+//! The users of the transport of a run-time directory, to tidy up after the last of them.
 //!
 //! The transport keeps one small segment for each run-time directory for good (it numbers the
 //! nodes), open to every user of the host. Here it is closed to others, and removed by the last
@@ -92,7 +92,7 @@ impl Users {
         let _ = std::fs::remove_dir_all(self.host.transport_directory());
     }
 
-    /// True where a program lives that uses the transport without our lock: none of Dynocar's.
+    /// Returns whether a program lives that uses the transport without our lock: none of Dynocar's.
     fn has_strangers(&self) -> bool {
         let mut has_any = false;
         if self.host.transport_directory().exists()
@@ -192,7 +192,7 @@ impl Users {
     }
 }
 
-/// True for a description that is written, and whose segment is ready.
+/// Returns true for a description that is written, and whose segment is ready.
 fn is_complete(service: &Path, segments: &[PathBuf]) -> bool {
     let number = |text: &str, key: &str| -> Option<u128> {
         text.lines().find_map(|line| line.strip_prefix(key))?.parse().ok()
@@ -228,7 +228,7 @@ fn wait_for(lock: impl Fn() -> Result<(), TryLockError>) -> std::io::Result<()> 
     Err(std::io::ErrorKind::TimedOut.into())
 }
 
-/// The refusal where shared memory is full.
+/// Returns the refusal where shared memory is full.
 pub fn full(free: u64, needed: u64) -> ChannelError {
     ChannelError::SharedMemoryFull {
         path: SHARED_MEMORY,

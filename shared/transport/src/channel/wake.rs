@@ -55,7 +55,7 @@ pub struct Sleeper {
 }
 
 impl Sleeper {
-    /// A bed for the thread that serves these trains in the daemon of this epoch.
+    /// Returns a bed for the thread that serves these trains in the daemon of this epoch.
     ///
     /// # Errors
     ///
@@ -119,7 +119,7 @@ pub struct Waker {
 }
 
 impl Waker {
-    /// An account for a train.
+    /// Returns an account for a train.
     ///
     /// # Errors
     ///

@@ -165,7 +165,7 @@ fn left_out(folder: &Path, whole: &SurveyAnswer) -> Result<LeftOut, String> {
     Ok(all)
 }
 
-/// The same trips on a line of which no gradient is known.
+/// Returns the same trips on a line of which no gradient is known.
 fn declared_level(folder: &Path) -> Result<Dataset, String> {
     let file = folder.join("track.toml");
     let text = std::fs::read_to_string(&file).map_err(|error| error.to_string())?;

@@ -44,7 +44,7 @@ fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
     f64::sqrt(sum / count)
 }
 
-/// The verdict on all pairs mapped as another day's.
+/// Returns the verdict on all pairs mapped as another day's.
 pub fn other_days(pairs: &[OtherDay]) -> Result<String, String> {
     let each: Vec<f64> = pairs.iter().map(|it| it.apart_mps).collect();
     let apart_mps = root_mean_square(each.iter().copied());
@@ -55,7 +55,7 @@ pub fn other_days(pairs: &[OtherDay]) -> Result<String, String> {
     if apart_mps <= together_mps + WORSE_MAX_MPS { Ok(words) } else { Err(words) }
 }
 
-/// The verdict on all pairs with their force from power.
+/// Returns the verdict on all pairs with their force from power.
 pub fn powers(pairs: &[ByPower]) -> Result<String, String> {
     let apart = root_mean_square(pairs.iter().map(|it| it.apart));
     let error_mps = root_mean_square(pairs.iter().map(|it| it.error_mps));
@@ -137,7 +137,7 @@ pub fn by_power(surveyed: &Path) -> Result<ByPower, String> {
     Ok(ByPower { efficiency: estimated.answer.efficiency, auxiliaries_kw, apart, error_mps })
 }
 
-/// Root mean square difference of the control forces of the runs held out, as a share of that of the
+/// Returns the root mean square difference of the control forces of the runs held out, as a share of that of the
 /// recorded ones.
 fn apart(recorded: &Dataset, powered: &Dataset) -> Result<f64, String> {
     let (mut difference, mut size) = (0.0, 0.0);

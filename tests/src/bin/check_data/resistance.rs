@@ -27,7 +27,7 @@ pub fn check(report: &mut Report, folder: &Path) {
     check_flagged(report, &folder.join("independent/ses-crossing"));
 }
 
-/// The true resistance of practice run p01, from its truth file.
+/// Returns the true resistance of practice run p01, from its truth file.
 fn practice_truth(folder: &Path) -> Option<Davis> {
     let text = std::fs::read_to_string(folder.join("practice-truth/p01.json")).ok()?;
     let truth: Value = serde_json::from_str(&text).ok()?;
@@ -74,7 +74,7 @@ fn check_resistance(report: &mut Report, folder: &Path, truth: Davis, tolerance:
     report.note(&what, outcome);
 }
 
-/// Largest relative error of w0, and the share of speeds at which the 95 % band holds the truth.
+/// Returns the largest relative error of w0, and the share of speeds at which the 95 % band holds the truth.
 fn deviation(snapshot: &ParameterSnapshot, truth: Davis) -> Option<(f64, f64)> {
     let margin = THIN_END * (snapshot.speed_max_mps - snapshot.speed_min_mps);
     let (low, high) = (snapshot.speed_min_mps + margin, snapshot.speed_max_mps - margin);

@@ -74,7 +74,7 @@ impl StopMasses {
     }
 }
 
-/// Index ranges of the samples from stop to stop.
+/// Returns the index ranges of the samples from stop to stop.
 fn sections(run: &Run) -> Vec<std::ops::Range<usize>> {
     let samples = &run.samples;
     let mut cuts = vec![0];
@@ -99,7 +99,7 @@ fn sections(run: &Run) -> Vec<std::ops::Range<usize>> {
     cuts.windows(2).map(|pair| pair[0]..pair[1]).filter(long).collect()
 }
 
-/// Mass counted while a section moved, in t; `None` where nobody counted.
+/// Returns the mass counted while a section moved, in t; `None` where nobody counted.
 fn counted_t(samples: &[TrainSample]) -> Option<f64> {
     let moving = samples.iter().filter(|it| it.speed_mps > 1.0);
     let counted = moving.filter_map(|it| it.get(SampleField::Mass));
@@ -107,13 +107,13 @@ fn counted_t(samples: &[TrainSample]) -> Option<f64> {
     (count > 0.0).then_some(1e-3 * sum / count)
 }
 
-/// A sample as a vehicle sends it that counts nobody.
+/// Returns a sample as a vehicle sends it that counts nobody.
 fn uncounted(sample: &TrainSample) -> TrainSample {
     let valid = sample.valid & !SampleField::Mass.bit();
     TrainSample { valid, mass_kg: f64::NAN, ..*sample }
 }
 
-/// The trips held out, fed to the pipeline as a daemon feeds it.
+/// Returns the trips held out, fed to the pipeline as a daemon feeds it.
 pub fn live(dataset: &Dataset, kind: PipelineKind) -> StopMasses {
     let settings = EstimatorSettings::default_of(kind).expect("the kind can be built");
     let train = &dataset.train;
@@ -139,7 +139,7 @@ pub fn live(dataset: &Dataset, kind: PipelineKind) -> StopMasses {
     masses
 }
 
-/// Each section of the trips held out alone, as `identify --per-run` does with runs.
+/// Returns each section of the trips held out alone, as `identify --per-run` does with runs.
 pub fn alone(dataset: &Dataset, kind: PipelineKind) -> StopMasses {
     let settings = EstimatorSettings::default_of(kind).expect("the kind can be built");
     let mut masses = StopMasses::default();

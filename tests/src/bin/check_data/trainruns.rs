@@ -93,7 +93,7 @@ fn compare(folder: &Path, train: &TheirTrain, path: &str) -> Result<String, Stri
     if (found_s / stated_s - 1.0).abs() <= TOLERANCE { Ok(detail) } else { Err(detail) }
 }
 
-/// The rows `- [a, b, …]` under a heading of a YAML file.
+/// Returns the rows `- [a, b, …]` under a heading of a YAML file.
 fn pairs(text: &str, heading: &str) -> Vec<Vec<f64>> {
     text.lines()
         .map(str::trim)
@@ -193,7 +193,7 @@ impl PermittedSpeed {
         (here + (next - here) * share).sqrt()
     }
 
-    /// Speed permitted where the next step ends, which depends on that speed: by fixed point.
+    /// Returns the speed permitted where the next step ends, which depends on that speed: by fixed point.
     fn after_step_mps(&self, motion: SimulatedMotion) -> f64 {
         (0..4).fold(motion.speed_mps, |speed_mps, _| {
             self.at_mps(motion.distance_m + 0.5 * STEP_S * (motion.speed_mps + speed_mps))

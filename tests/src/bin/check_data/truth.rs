@@ -46,12 +46,12 @@ impl Truth {
         })
     }
 
-    /// The kinds of its effects.
+    /// Returns the kinds of its effects.
     pub fn kinds(&self) -> Vec<&str> {
         self.effects.iter().filter_map(|effect| effect["kind"].as_str()).collect()
     }
 
-    /// Windows of time of an effect in the fitted runs: run, start and end in s.
+    /// Returns the windows of time of an effect in the fitted runs: run, start and end in s.
     pub fn windows<'a>(&self, effect: &'a Value) -> Vec<(&'a str, f64, f64)> {
         let list = effect["where"]["windows"].as_array().into_iter().flatten();
         list.filter_map(|window| {

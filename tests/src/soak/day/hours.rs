@@ -23,7 +23,7 @@ pub struct Hour {
     pub whole_states: usize,
 }
 
-/// Median and 99.9th percentile.
+/// Returns the median and 99.9th percentile.
 pub fn quantiles(mut values: Vec<u64>) -> (u64, u64) {
     values.sort_unstable();
     let at = |share: f64| {
@@ -33,7 +33,7 @@ pub fn quantiles(mut values: Vec<u64>) -> (u64, u64) {
     (at(0.5), at(0.999))
 }
 
-/// The hours as a table for people.
+/// Returns the hours as a table for people.
 pub fn table(hours: &[Hour]) -> String {
     let mut text = String::from(
         "hour  resident MiB     offered        used   rejected      lost  p50 µs  p99.9 µs  starts  states\n",

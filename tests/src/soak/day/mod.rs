@@ -3,7 +3,7 @@
 //!
 //! - [`train`]: one train with its controller and client
 //! - [`strange_host`]: the daemon's wall clock jumps, its disk fills
-//! - [`hours`]: what an hour showed
+//! - [`hours`]: the outcome of an hour
 
 pub mod hours;
 pub mod strange_host;
@@ -268,7 +268,7 @@ fn start(site: &DaemonSite, programs: &Programs, config: &Path, strange: &Strang
     site.start_with(&text(&programs.dynocar), &arguments, &strange.variables())
 }
 
-/// The shipped configuration for eight trains with states; and how many pipelines it has.
+/// Returns the shipped configuration for eight trains with states; and how many pipelines it has.
 fn daemon_text(states: &Path) -> (String, usize) {
     let mut config: toml::Table = SHIPPED.parse().expect("the shipped configuration");
     let pipelines = config["pipelines"].as_array().map_or(0, Vec::len);

@@ -45,7 +45,7 @@ impl StrangeHost {
         host
     }
 
-    /// The environment in which the program is to be started.
+    /// Returns the environment in which the program is to be started.
     pub fn variables(&self) -> [(&str, &str); 3] {
         self.variables.each_ref().map(|(name, value)| (*name, value.as_str()))
     }

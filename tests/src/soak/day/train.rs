@@ -205,7 +205,7 @@ impl DayTrain {
         std::array::from_fn(|k| accounts.iter().map(|account| account[k]).sum())
     }
 
-    /// Samples published so far.
+    /// Returns the samples published so far.
     pub fn published(&self) -> u64 {
         self.sequence
     }

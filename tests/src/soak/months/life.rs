@@ -50,7 +50,7 @@ pub struct Life<'f> {
 }
 
 impl<'f> Life<'f> {
-    /// A life whose files lie in an empty folder.
+    /// Returns a life whose files lie in an empty folder.
     ///
     /// # Panics
     ///
@@ -187,7 +187,7 @@ impl<'f> Life<'f> {
         write_dataset(&dataset_of(&self.world, runs), &folder).expect("a day's runs");
     }
 
-    /// Root mean square in m/s of a model's errors over some days.
+    /// Returns the root mean square in m/s of a model's errors over some days.
     fn error_of(&self, model: ModelHash, from_day: usize, days: i64) -> Option<f64> {
         let record = record::TrialRecord::read(self.models.folder());
         let from = (FIRST_DAY_S / DAY_S) as i64 + from_day as i64;
@@ -225,7 +225,7 @@ fn put_others(models: &TrainModels, train: &TrainConfig, declared: ModelHash) {
     }
 }
 
-/// A dataset of some runs; nothing in it reveals the truth.
+/// Returns a dataset of some runs; nothing in it reveals the truth.
 fn dataset_of(
     world: &SimulatedWorld,
     runs: Vec<crate::simulator::SimulatedRun>,

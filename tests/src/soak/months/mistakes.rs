@@ -1,4 +1,4 @@
-//! How often a model that is no better is adopted, over hundreds of train years.
+//! The rate at which a model that is no better is adopted, over hundreds of train years.
 //!
 //! For each of many simulated trains without an effect, some hundred trips are driven and predicted by
 //! the declared model and by rival models that are no better. Years are then made of these trips, drawn
@@ -70,7 +70,7 @@ pub fn measure(
     found
 }
 
-/// The scores of each rival, trip by trip.
+/// Returns the scores of each rival, trip by trip.
 fn scores(seed: u64) -> Vec<Vec<f64>> {
     let settings = SimulatorSettings {
         runs: DRIVEN,

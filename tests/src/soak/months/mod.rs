@@ -1,14 +1,14 @@
-//! Months of one train in accelerated time: what is undeclared appears and goes, and the loop of
-//! learning, trying, adopting and taking back has to follow.
+//! Months of one train in accelerated time: undeclared effects appear and go, and the loop of learning, trying,
+//! adopting and taking back has to follow.
 //!
 //! No processes and no clocks: the simulator drives the trips of each day; the models on trial and the
 //! residual monitor take every one of them, the learner what a recorder would have kept. A rule
 //! adopts. Everything follows from the seed.
 //!
-//! - [`story`]: what is undeclared on which day
+//! - [`story`]: the undeclared effect of each day
 //! - [`life`]: the days
 //! - [`mistakes`]: how often a model that is no better is adopted, over hundreds of years
-//! - [`table`]: what came of it
+//! - [`table`]: the outcome
 
 pub mod life;
 pub mod mistakes;

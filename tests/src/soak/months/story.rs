@@ -54,7 +54,7 @@ pub struct LifeSettings {
 const WEAR: f64 = 0.015;
 
 impl Story {
-    /// Its name: of the story, or of the kind that appears.
+    /// Returns its name: of the story, or of the kind that appears.
     pub fn name(self) -> String {
         match self {
             Story::Nothing => "nothing".into(),
@@ -65,19 +65,19 @@ impl Story {
         }
     }
 
-    /// The story of a name.
+    /// Returns the story of a name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::all().into_iter().find(|story| story.name() == name)
     }
 
-    /// Every story.
+    /// Returns every story.
     pub fn all() -> Vec<Self> {
         let kinds = EffectKind::ALL.iter().filter(|&&kind| kind != EffectKind::None);
         let own = [Story::Nothing, Story::WheelsWear, Story::Winter, Story::BrakeDrags];
         own.into_iter().chain(kinds.map(|&kind| Story::Appears(kind))).collect()
     }
 
-    /// The kind of effect that the simulator must have a fitting train and line for.
+    /// Returns the kind of effect that the simulator must have a fitting train and line for.
     pub fn kind(self) -> Option<EffectKind> {
         match self {
             Story::Nothing => None,
@@ -88,7 +88,7 @@ impl Story {
         }
     }
 
-    /// True where it ends on the last day of its span, else it goes on.
+    /// Returns whether it ends on the last day of its span, else it goes on.
     pub fn ends(self) -> bool {
         matches!(self, Story::WheelsWear | Story::Winter | Story::BrakeDrags)
     }

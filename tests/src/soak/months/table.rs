@@ -43,14 +43,14 @@ impl LifeOutcome {
         LifeOutcome { settings, errors_mps, adoptions, rounds: 0, events: Vec::new() }
     }
 
-    /// Mean over some days of the error of the model in force, in m/s.
+    /// Returns the mean over some days of the error of the model in force, in m/s.
     pub fn error_mps(&self, days: std::ops::Range<usize>) -> Option<f64> {
         let days = days.start.min(self.errors_mps.len())..days.end.min(self.errors_mps.len());
         let known: Vec<f64> = self.errors_mps[days].iter().flatten().copied().collect();
         (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
     }
 
-    /// The first change on or after a day and before another.
+    /// Returns the first change on or after a day and before another.
     pub fn first_change(&self, days: std::ops::Range<usize>, is_rollback: bool) -> Option<usize> {
         let fits = |it: &&Adoption| it.is_rollback == is_rollback && days.contains(&it.day);
         self.adoptions.iter().find(fits).map(|it| it.day)
@@ -67,7 +67,7 @@ pub const HEADER: &str = "| story | seed | onset to adoption, days | error befor
     | end to rollback, days | changes | mistakes | events | rounds | found |\n\
     | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
 
-/// A life as a line of a table.
+/// Returns a life as a line of a table.
 pub fn line(outcome: &LifeOutcome) -> String {
     let LifeSettings { story, span, seed, days, .. } = outcome.settings;
     let last = if story.ends() { span.end } else { days };

@@ -29,7 +29,7 @@ pub struct CandidateRow {
     pub reason: String,
 }
 
-/// Every kind that was considered: what was found first, then by the evidence alone.
+/// Returns every kind that was considered: what was found first, then by the evidence alone.
 pub fn rows(explanation: &Explanation) -> Vec<CandidateRow> {
     let outcome = &explanation.outcome;
     let found: Vec<&str> = explanation.answer.effects.iter().map(|effect| effect.kind).collect();

@@ -81,12 +81,12 @@ impl Covariate {
     pub const ALWAYS: [Covariate; 4] =
         [Covariate::Chainage, Covariate::Speed, Covariate::TimeSinceStart, Covariate::Run];
 
-    /// The one over which a kind is seen best.
+    /// Returns the one over which a kind is seen best.
     pub fn of_kind(kind: EffectKind) -> Option<Self> {
         KindRow::of(kind).seen_over.and_then(Covariate::of_name)
     }
 
-    /// The one that a place or a kind's row names.
+    /// Returns the one that a place or a kind's row names.
     pub fn of_name(name: &str) -> Option<Self> {
         Some(match name {
             "chainage_m" => Covariate::Chainage,
@@ -108,12 +108,12 @@ impl Covariate {
         COMMON.iter().find(own).unwrap_or(&TIME_IN_RUN)
     }
 
-    /// Name for people.
+    /// Returns the name for people.
     pub fn title(self) -> &'static str {
         self.row().title
     }
 
-    /// Unit of its values; empty for numbers and names.
+    /// Returns the unit of its values; empty for numbers and names.
     pub fn unit(self) -> &'static str {
         self.row().unit
     }
@@ -123,12 +123,12 @@ impl Covariate {
         self.row().per_unit
     }
 
-    /// True when its values are names, not quantities.
+    /// Returns whether its values are names, not quantities.
     pub fn is_category(self) -> bool {
         matches!(self, Covariate::Run | Covariate::Direction)
     }
 
-    /// Its mean over a window, in SI units (temperature in °C); `None` where it is not known or
+    /// Returns its mean over a window, in SI units (temperature in °C); `None` where it is not known or
     /// does not apply.
     pub fn value(self, window: &FitWindow, run: &RunData) -> Option<f64> {
         let (bins, samples) = (window.bins(run), run.samples());

@@ -1,4 +1,4 @@
-//! An effect in words: kind, size, location, what it means, how sure it is, and what to do.
+//! An effect in words: kind, size, location, cost to the railway, significance, and the recommended action.
 
 use std::collections::BTreeMap;
 
@@ -33,7 +33,7 @@ fn listed(sizes: &[String]) -> String {
     if sizes.is_empty() { String::new() } else { format!(" – {}", joined(sizes)) }
 }
 
-/// The numbers of an effect, each with its meaning, unit and 95 % interval.
+/// Returns the numbers of an effect, each with its meaning, unit and 95 % interval.
 pub fn sizes(parameters: &Values, std: &Values) -> Vec<String> {
     let mut sizes = Vec::new();
     for (name, value) in parameters {
@@ -114,7 +114,7 @@ pub fn small(outcome: &SearchOutcome, trial: &EffectTrial) -> String {
     format!("{} ({})", kind_name(trial.kind.name()), each.collect::<Vec<_>>().join(", "))
 }
 
-/// Windows by run and time, however they were found.
+/// Returns the windows by run and time, however they were found.
 fn in_order<W>(windows: &[W], key: fn(&W) -> (&String, f64)) -> std::vec::IntoIter<&W> {
     let mut all: Vec<&W> = windows.iter().collect();
     all.sort_by(|one, other| {
@@ -127,7 +127,7 @@ fn in_order<W>(windows: &[W], key: fn(&W) -> (&String, f64)) -> std::vec::IntoIt
 /// The words for the probability of an effect.
 pub const CHANCE: &str = "chance of as much where nothing acts";
 
-/// How sure it is that an effect acts, by the probability of finding as much where nothing does.
+/// Returns how sure it is that an effect acts, by the probability of finding as much where nothing does.
 pub fn sureness(p_value: f64) -> String {
     let odds = 1.0 / p_value.max(1e-300);
     let odds = match odds {
@@ -174,7 +174,7 @@ pub fn meaning(meaning: &EffectMeaning) -> String {
     parts.join("; ")
 }
 
-/// Where an effect acts, and how well the ends are known; `None` when it acts everywhere.
+/// Returns where an effect acts, and how well the ends are known; `None` when it acts everywhere.
 pub fn located(place: &Location) -> Option<String> {
     let mut parts = Vec::new();
     let listed = |all: Vec<String>| {
@@ -213,7 +213,7 @@ pub fn located(place: &Location) -> Option<String> {
     (!parts.is_empty()).then(|| parts.join(", "))
 }
 
-/// How well the ends of a place are known: half of the widest 95 % interval.
+/// Returns how well the ends of a place are known: half of the widest 95 % interval.
 fn precision(known: &PlaceUncertainty) -> Option<String> {
     let half = |interval: [f64; 2]| 0.5 * (interval[1] - interval[0]);
     let widest = |ends: &mut dyn Iterator<Item = [f64; 2]>| ends.map(half).reduce(f64::max);

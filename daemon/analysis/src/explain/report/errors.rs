@@ -69,7 +69,7 @@ pub struct Errors {
 }
 
 impl Errors {
-    /// The errors of an explanation's models.
+    /// Returns the errors of an explanation's models.
     pub fn of(explanation: &Explanation) -> Self {
         let (before, after) = (&explanation.outcome.base, &explanation.outcome.fit);
         let (fit, holdout) = (&explanation.problem.runs[..], &explanation.holdout[..]);
@@ -93,7 +93,7 @@ impl Errors {
         }
     }
 
-    /// The errors that judge the model: those of the holdout runs, else those of the fit runs; from
+    /// Returns the errors that judge the model: those of the holdout runs, else those of the fit runs; from
     /// stop to stop where there are stops.
     pub fn judged(&self) -> Option<(Role, Judged)> {
         let one = |stops: &Option<StopToStop>, pair: Option<ErrorPair>| {
@@ -150,7 +150,7 @@ fn error_pair(runs: &[RunData], before: &Fit, after: &Fit, restart: Restart) -> 
     bootstrap(&units, resampling)
 }
 
-/// The errors of one run in blocks of 60 s.
+/// Returns the errors of one run in blocks of 60 s.
 fn blocks(run: &RunData, before: &Fit, after: &Fit, restart: Restart) -> Vec<[SpeedError; 2]> {
     let (samples, time_s) = (run.samples(), run.recording.time_s());
     let count = (run.duration_s() / BLOCK_S) as usize + 1;

@@ -12,14 +12,14 @@ pub struct IntervalEstimate {
 }
 
 impl IntervalEstimate {
-    /// A value with 1.96 standard deviations to either side; none when that is no number.
+    /// Returns a value with 1.96 standard deviations to either side; none when that is no number.
     pub fn normal(value: f64, deviation: f64) -> Self {
         let half = HALF_95 * deviation;
         let is_known = half.is_finite() && half > 0.0;
         IntervalEstimate { value, interval: is_known.then_some([value - half, value + half]) }
     }
 
-    /// The same of what cannot be less than a least.
+    /// Returns the same of what cannot be less than a least.
     pub fn at_least(self, least: f64) -> Self {
         let interval = self.interval.map(|ends| ends.map(|it| it.max(least)));
         IntervalEstimate { interval, ..self }

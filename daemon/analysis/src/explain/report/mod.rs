@@ -9,8 +9,8 @@
 //!   covariates
 //! - [`residual_line`]: the same along the line, by direction, with the places found
 //! - [`timeline`]: the explanation as events and series in time, speeds of runs
-//! - [`parameters`]: what was fitted, with uncertainty
-//! - [`candidates`]: what else was considered
+//! - [`parameters`]: fitted values, with uncertainty
+//! - [`candidates`]: other explanations
 //!
 //! The quality of a run's data is in the dataset itself ([`RunQuality`](crate::dataset::RunQuality)) and in
 //! [`RunData`](super::evidence::RunData).

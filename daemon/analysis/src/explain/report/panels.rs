@@ -63,7 +63,7 @@ pub struct Zones {
     pub ranges: Vec<(Covariate, [f64; 2])>,
 }
 
-/// Where the effects of an explanation act.
+/// Returns where the effects of an explanation act.
 pub fn zones(explanation: &Explanation) -> Zones {
     let mut zones = Zones::default();
     explanation.answer.effects.iter().for_each(|effect| zones.add(effect));
@@ -71,7 +71,7 @@ pub fn zones(explanation: &Explanation) -> Zones {
 }
 
 impl Zones {
-    /// Where one effect acts.
+    /// Returns where one effect acts.
     pub fn of(effect: &EffectAnswer) -> Self {
         let mut zones = Zones::default();
         zones.add(effect);
@@ -105,7 +105,7 @@ impl Zones {
         }
     }
 
-    /// Stretches of time in s, in the recording's own count, in which all that is known of one effect's
+    /// Returns the stretches of time in s, in the recording's own count, in which all that is known of one effect's
     /// runs, windows, chainages and speeds holds; the whole run where nothing is known of them.
     pub fn acting_s(&self, run: &RunData) -> Vec<[f64; 2]> {
         let within = |range: &[f64; 2], value: f64| (range[0]..=range[1]).contains(&value);
@@ -127,7 +127,7 @@ impl Zones {
         sections(run, acts)
     }
 
-    /// Stretches of time in s, in the recording's own count, in which an effect acts on a run.
+    /// Returns the stretches of time in s, in the recording's own count, in which an effect acts on a run.
     pub fn times_s(&self, run: &RunData) -> Vec<[f64; 2]> {
         let own = self.windows.iter().filter(|window| window.run == run.file);
         let mut times: Vec<[f64; 2]> = own.map(|w| [w.t_start_s, w.t_end_s]).collect();
@@ -161,7 +161,7 @@ impl Zones {
     }
 }
 
-/// Stretches of a run's time in s, in the recording's own count, in which something holds.
+/// Returns the stretches of a run's time in s, in the recording's own count, in which something holds.
 fn sections(run: &RunData, holds: impl Fn(&ResolvedSample, f64) -> bool) -> Vec<[f64; 2]> {
     let mut times = Vec::new();
     let mut open: Option<[f64; 2]> = None;
@@ -177,7 +177,7 @@ fn sections(run: &RunData, holds: impl Fn(&ResolvedSample, f64) -> bool) -> Vec<
     times
 }
 
-/// The panels: first the covariate on which the effect is seen best, then those that are always
+/// Returns the panels: first the covariate on which the effect is seen best, then those that are always
 /// shown, then those on which the residual is most uneven.
 pub fn panels(dataset: &Dataset, explanation: &Explanation, windows: &[FitWindow]) -> Vec<Panel> {
     let (runs, zones) = (&explanation.problem.runs, zones(explanation));
@@ -226,7 +226,7 @@ fn leading(explanation: &Explanation) -> Vec<Covariate> {
     explanation.answer.effects.iter().filter_map(of_effect).collect()
 }
 
-/// Mean squared residual without the effects in units of its error.
+/// Returns the mean squared residual without the effects in units of its error.
 fn unevenness(panel: &Panel) -> f64 {
     let sum: f64 = panel
         .bins
@@ -236,7 +236,7 @@ fn unevenness(panel: &Panel) -> f64 {
     sum / panel.bins.len() as f64
 }
 
-/// Covariance of the updated model's parameters, with the deviations that are reported.
+/// Returns the covariance of the updated model's parameters, with the deviations that are reported.
 pub(super) fn covariance(explanation: &Explanation) -> DMatrix<f64> {
     let Deviations { std: deviations, covariance, .. } = &explanation.deviations;
     let count = deviations.len();
@@ -247,7 +247,7 @@ pub(super) fn covariance(explanation: &Explanation) -> DMatrix<f64> {
     })
 }
 
-/// Windows in order of a covariate, in bins.
+/// Returns the windows in order of a covariate, in bins.
 pub(super) fn bins<'w>(
     covariate: Covariate,
     windows: impl Iterator<Item = &'w FitWindow>,

@@ -79,7 +79,7 @@ fn effect_rows(dataset: &Dataset, effect: &EffectAnswer) -> Vec<ParameterRow> {
     rows.collect()
 }
 
-/// The numbers of a parameter, each with what it means.
+/// Returns the numbers of a parameter, each with what it means.
 fn figures(meaning: &str, value: &ParameterValue, std: Option<&ParameterValue>) -> Vec<Figure> {
     let listed = |index: usize| match std {
         Some(ParameterValue::List(list)) => list.get(index).copied(),
@@ -171,7 +171,7 @@ pub struct PlaceTable {
 }
 
 impl PlaceTable {
-    /// The places in an answer.
+    /// Returns the places in an answer.
     pub fn of(explanation: &Explanation) -> Self {
         let mut table = PlaceTable::default();
         for effect in &explanation.answer.effects {
@@ -182,7 +182,7 @@ impl PlaceTable {
         table
     }
 
-    /// True when no place was estimated.
+    /// Returns whether no place was estimated.
     pub fn is_empty(&self) -> bool {
         self.ends.is_empty() && self.runs.is_empty()
     }

@@ -103,7 +103,7 @@ fn sections(effect: &EffectAnswer, runs: &[&RunData]) -> Vec<MarkedInterval> {
     by_section.chain(by_window).collect()
 }
 
-/// Where a run's train was in a window of time.
+/// Returns where a run's train was in a window of time.
 fn driven_over(
     run: &RunData,
     window: &RunWindow,

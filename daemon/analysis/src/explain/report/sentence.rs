@@ -47,7 +47,7 @@ pub fn verdict_words(
     VerdictWords { heading: heading + ".", whole: whole + ".", left }
 }
 
-/// The verdict of an answer, the meaning of its effect and the error reduction.
+/// Returns the verdict of an answer, the meaning of its effect and the error reduction.
 pub fn sentence(answer: &ExplainAnswer, errors: &Errors) -> String {
     let VerdictWords { heading, whole, left } = &answer.words;
     let is_impossible = answer.impossibilities().next().is_some();
@@ -115,7 +115,7 @@ mod tests {
         }
     }
 
-    /// An ambiguous answer.
+    /// Returns an ambiguous answer.
     fn ambiguous() -> ExplainAnswer {
         let none = DavisDeviations { a: 0.0, b: 0.0, c: 0.0 };
         ExplainAnswer {
@@ -147,7 +147,7 @@ mod tests {
         }
     }
 
-    /// Errors over whole runs held out that grow.
+    /// Returns the errors over whole runs held out that grow.
     fn updated_errors() -> Errors {
         let value = |value| IntervalEstimate { value, interval: None };
         let pair = ErrorPair {

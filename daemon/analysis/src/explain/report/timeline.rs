@@ -1,4 +1,4 @@
-//! An explanation as events and series in time, run by run: what lies beside the data on a timeline; measured and
+//! An explanation as events and series in time, run by run: the entries beside the data on a timeline; measured and
 //! predicted speeds of some runs, thinned for drawing.
 
 use dynocar_model::simulate::Restart;
@@ -91,7 +91,7 @@ pub struct ActingEffect {
 }
 
 impl Timeline {
-    /// The timeline of an explanation of a dataset.
+    /// Returns the timeline of an explanation of a dataset.
     pub fn of(dataset: &Dataset, explanation: &Explanation) -> Self {
         let all = || explanation.problem.runs.iter().chain(&explanation.holdout);
         let of_file = |file: &str| all().find(|it| it.file == file);
@@ -132,8 +132,8 @@ impl RunTimeline {
     }
 }
 
-/// Speeds at the samples of a run, by number; predicted open loop from its first sample to its last, anew from each
-/// standstill.
+/// Returns the speeds at the samples of a run, by number; predicted open loop from its first sample to its last, anew
+/// from each standstill.
 fn speeds<'r>(
     explanation: &Explanation,
     run: &'r RunData,
@@ -148,7 +148,7 @@ fn speeds<'r>(
     }
 }
 
-/// Where the effects act on a run, effect by effect.
+/// Returns where the effects act on a run, effect by effect.
 fn acting(run: &RunData, explanation: &Explanation) -> Vec<ActingEffect> {
     let position_m = |time_s: f64| {
         let i = run.recording.time_s().partition_point(|&it| run.offset_s + it < time_s);
@@ -192,7 +192,7 @@ pub struct Trace {
     pub acting_s: Vec<[f64; 2]>,
 }
 
-/// The holdout runs with the greatest error before, the greatest first; fit runs when nothing was
+/// Returns the holdout runs with the greatest error before, the greatest first; fit runs when nothing was
 /// held out.
 pub fn traces(explanation: &Explanation) -> Vec<Trace> {
     let holdout = &explanation.holdout;

@@ -31,7 +31,7 @@ pub struct FitWindow {
 }
 
 impl FitWindow {
-    /// The window's bins.
+    /// Returns the window's bins.
     pub fn bins<'r>(&self, run: &'r RunData) -> &'r [Bin] {
         &run.bins[self.first..self.end]
     }
@@ -51,7 +51,7 @@ fn slope(bins: &[Bin], values: &[f64]) -> f64 {
     if square > 0.0 { product / square } else { 0.0 }
 }
 
-/// All windows of the fit runs.
+/// Returns all windows of the fit runs.
 pub fn windows(explanation: &Explanation) -> Vec<FitWindow> {
     let (before, after) = (&explanation.outcome.base, &explanation.outcome.fit);
     let mut windows = Vec::new();
@@ -79,7 +79,7 @@ fn force_n_per_kn(run: &RunData, first: usize, end: usize, differences: &[f64]) 
     -middle.inertial_mass_kg / middle.weight_kn * slope(own, &differences[first..end])
 }
 
-/// The resistance in N/kN that a model lacks, for each window of any run: first bin and the one past the
+/// Returns the resistance in N/kN that a model lacks, for each window of any run: first bin and the one past the
 /// last, and the resistance.
 pub(super) fn missing_resistance(fit: &Fit, run: &RunData) -> Vec<((usize, usize), f64)> {
     let (mut forces, mut predicted) = (UpdatedForces::default(), Vec::new());
@@ -90,7 +90,7 @@ pub(super) fn missing_resistance(fit: &Fit, run: &RunData) -> Vec<((usize, usize
     spans(&run.bins).into_iter().map(of).collect()
 }
 
-/// First and end of the windows; none crosses a break of motion.
+/// Returns the first and end of the windows; none crosses a break of motion.
 fn spans(bins: &[Bin]) -> Vec<(usize, usize)> {
     let mut spans = Vec::new();
     let mut first = 0;

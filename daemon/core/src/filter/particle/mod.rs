@@ -19,7 +19,7 @@ pub trait ParticleModel<const D: usize> {
     /// Draws a state of the first step.
     fn draw_initial(&self, random: &mut Random) -> [f64; D];
 
-    /// The next step's state without process noise.
+    /// Returns the next step's state without process noise.
     fn advance(&self, step: usize) -> impl Fn([f64; D]) -> [f64; D];
 
     /// Draws the process noise of the move that starts at `step`.
@@ -35,7 +35,7 @@ pub trait ParticleModel<const D: usize> {
         densities: &mut [f64],
     );
 
-    /// Logarithm of the density of the step's measurement given the state.
+    /// Returns the logarithm of the density of the step's measurement given the state.
     fn log_likelihood(&self, step: usize) -> impl Fn([f64; D]) -> f64;
 }
 
@@ -136,7 +136,7 @@ impl<const D: usize> ParticleSmoother<D> {
         Ok(())
     }
 
-    /// Where a step's particles lie in every array.
+    /// Returns where a step's particles lie in every array.
     fn indices(&self, step: usize) -> Range<usize> {
         step * self.particles..(step + 1) * self.particles
     }
@@ -226,13 +226,13 @@ impl<const D: usize> ParticleSmoother<D> {
         Ok(())
     }
 
-    /// Mean and covariance of the particles of a step before its measurement was weighed in;
+    /// Returns the mean and covariance of the particles of a step before its measurement was weighed in;
     /// `None` unless the last run reached the step.
     pub fn predicted_moments(&self, step: usize) -> Option<([f64; D], [[f64; D]; D])> {
         (step < self.steps).then(|| self.moments(step, |_| 1.0 / self.particles as f64))
     }
 
-    /// Mean and covariance of the particles of a step given every measurement; valid after
+    /// Returns the mean and covariance of the particles of a step given every measurement; valid after
     /// [`ParticleSmoother::smooth`], `None` unless the last run reached the step.
     pub fn smoothed_moments(&self, step: usize) -> Option<([f64; D], [[f64; D]; D])> {
         (step < self.steps).then(|| self.moments(step, |index| self.smoothed[index]))

@@ -39,7 +39,7 @@ mod tests {
     use super::*;
     use crate::filter::random::Random;
 
-    /// The same by a search.
+    /// Returns the same by a search.
     fn found(weights: &[f64], offset: f64) -> Vec<usize> {
         let spacing = weights.iter().sum::<f64>() / weights.len() as f64;
         let (mut ancestor, mut cumulated) = (0, weights[0]);

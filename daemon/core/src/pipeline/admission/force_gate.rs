@@ -77,7 +77,7 @@ impl Reading {
         })
     }
 
-    /// True when a moving train has sent the same once more, place and all.
+    /// Returns whether a moving train has sent the same once more, place and all.
     fn repeats(&self, last: &Reading) -> bool {
         self.content[1].is_some() && self.content == last.content
     }
@@ -133,12 +133,12 @@ impl ForceGate {
         self.compare(sample, &now, &level, &newest)
     }
 
-    /// The samples that [`GateVerdict::Release`] speaks of, the oldest first.
+    /// Returns the samples that [`GateVerdict::Release`] speaks of, the oldest first.
     pub fn released(&self, index: usize) -> Option<ResolvedSample> {
         self.held.get(index).copied().flatten()
     }
 
-    /// True while too many samples are withdrawn for any to be taken.
+    /// Returns whether too many samples are withdrawn for any to be taken.
     pub fn is_in_doubt(&self) -> bool {
         self.first_changes == FIRST_CHANGES && self.withdrawn_share > LONE_SHARE.high
     }
@@ -158,7 +158,7 @@ impl ForceGate {
         self.unless_in_doubt(GateVerdict::Take)
     }
 
-    /// A sample that adds nothing new.
+    /// Returns a sample that adds nothing new.
     fn pass_over(&mut self, step_s: f64) -> GateVerdict {
         self.skipped_s += step_s;
         if self.skipped_s <= REPEATED.high {
@@ -248,12 +248,12 @@ impl ForceGate {
         if self.is_in_doubt() { GateVerdict::Refuse(RejectionReason::Outlier) } else { verdict }
     }
 
-    /// Time in s that the held samples have taken.
+    /// Returns the time in s that the held samples have taken.
     fn held_s(&self) -> f64 {
         self.held[..self.held_count].iter().flatten().map(|sample| sample.step_s).sum()
     }
 
-    /// Whether force or speed lies above the level or below it; `None` while near it.
+    /// Returns whether force or speed lies above the level or below it; `None` while near it.
     fn departure(&self, now: &Reading, level: &Reading, since_level_s: f64) -> Option<bool> {
         let faster_mps = now.speed_mps - level.speed_mps;
         if faster_mps.abs() > TOLERANCE_MPS + ACCELERATION_MAX_MPS2 * since_level_s {

@@ -101,12 +101,13 @@ mod tests {
     /// Share of sound samples that an estimator refuses.
     const SOUND_REFUSALS: f64 = 0.02;
 
-    /// Probability, at most, that a normal error lies beyond some standard deviations on either side.
+    /// Returns the probability, at most, that a normal error lies beyond some standard deviations on either side.
     fn beyond(deviations: f64) -> f64 {
         2.0 * (-0.5 * deviations * deviations).exp()
     }
 
-    /// Probability, at most, that a fading share of events of some probability exceeds a limit (Chernoff 1952).
+    /// Returns the probability, at most, that a fading share of events of some probability exceeds a limit (Chernoff
+    /// 1952).
     fn share_beyond(limit: &Limit, memory: f64, probability: f64) -> f64 {
         let weights: Vec<f64> =
             (0..20 * memory as i32).map(|age| (1.0 - 1.0 / memory).powi(age) / memory).collect();

@@ -1,4 +1,4 @@
-//! Admission of samples: one judge of what comes in, and the one writer of a status.
+//! Admission of samples: the one judge of incoming samples, and the one writer of a status.
 //!
 //! A sample is *refused* by validation (it cannot be true), by the force gate (its force stands alone, or it only
 //! repeats) or by the estimator (it lacks a force, slides, does not fit). The input is *doubted* while units, signs or

@@ -1,4 +1,4 @@
-//! Which samples are fit for use, and why the others are not.
+//! Validation of samples, with a reason for each refusal.
 //!
 //! A [`Validator`] sees every sample of one train in the order of arrival. It refuses what
 //! cannot be true and counts what never came; it never repairs a value. Where the train has
@@ -47,12 +47,12 @@ pub struct Validator {
 }
 
 impl Validator {
-    /// A validator for one train of a nominal mass in kg.
+    /// Returns a validator for one train of a nominal mass in kg.
     pub fn new(train: TrainId, nominal_mass_kg: f64) -> Self {
         Validator { train: train.0, nominal_mass_kg, ..Validator::default() }
     }
 
-    /// Samples that never arrived so far.
+    /// Returns the samples that never arrived so far.
     pub fn lost(&self) -> u64 {
         self.lost
     }
@@ -142,7 +142,7 @@ impl Validator {
         Ok(())
     }
 
-    /// The samples lost if the newest gap never was, once enough samples in a row say so.
+    /// Returns the samples lost if the newest gap never was, once enough samples in a row say so.
     fn lost_without(&mut self, mut gap: Gap, sample: &TrainSample) -> Option<u64> {
         let goes_on = sample.sequence > gap.newest;
         gap.refused = if goes_on { gap.refused + 1 } else { 0 };
@@ -182,7 +182,7 @@ impl Validator {
         if is_plausible { Ok(()) } else { Err(RejectionReason::OutOfRange) }
     }
 
-    /// The step in s since the last accepted sample, `None` when a new segment starts here.
+    /// Returns the step in s since the last accepted sample, `None` when a new segment starts here.
     fn check_motion(&self, sample: &TrainSample) -> Result<Option<f64>, RejectionReason> {
         let Some(last) = &self.last else { return Ok(None) };
         if sample.run != last.run {
@@ -224,7 +224,7 @@ impl Validator {
         Ok(())
     }
 
-    /// True when enough refused samples in a row continue each other.
+    /// Returns whether enough refused samples in a row continue each other.
     fn is_new_beginning(&mut self, sample: &TrainSample) -> bool {
         let continues = self.last_refused.as_ref().is_some_and(|before| {
             let step_s = step_s(before, sample);

@@ -47,7 +47,7 @@ settings! {
     }
 }
 
-/// Standard deviation that comes in 1 s from steps of 0.2 s, uniform within a half width, each of
+/// Returns the standard deviation that comes in 1 s from steps of 0.2 s, uniform within a half width, each of
 /// variance w²/3.
 fn walk_per_sqrt_s(half_width: f64) -> f64 {
     (half_width * half_width / 3.0 / 0.2).sqrt()
@@ -65,7 +65,7 @@ impl BrakingSettings {
         require(is_longer, "gap_max_s", self.gap_max_s, "at least interval_s")
     }
 
-    /// The noise of motion and measurement.
+    /// Returns the noise of motion and measurement.
     pub fn noise(&self) -> MotionNoise {
         MotionNoise {
             distance_m2_per_s: self.position_walk_m.powi(2),
@@ -75,7 +75,7 @@ impl BrakingSettings {
         }
     }
 
-    /// True when an estimate is precise enough to be used.
+    /// Returns whether an estimate is precise enough to be used.
     pub fn counts(&self, estimate: &BrakingEstimate) -> bool {
         let coefficient = estimate.coefficient;
         coefficient.std <= self.relative_std_max * coefficient.value.abs()
@@ -142,6 +142,6 @@ pub trait Engine: Send {
     /// Takes the variance of a measured distance in m² for another one from the next step on.
     fn set_distance_variance(&mut self, variance_m2: f64);
 
-    /// The estimate, once there is one.
+    /// Returns the estimate, once there is one.
     fn estimate(&self) -> Option<BrakingEstimate>;
 }

@@ -1,4 +1,4 @@
-//! The estimator behind every braking pipeline: intake, engine, and what of an estimate may be said.
+//! The estimator behind every braking pipeline: intake, engine, and the judgement of an estimate.
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::TrainModel;
@@ -10,9 +10,9 @@ use nalgebra::{Matrix1, Matrix2, SVector};
 use super::engine::{BrakingEstimate, BrakingObservation, BrakingSettings, Engine, EngineStep};
 use super::intake::{BrakingCoefficient, BrakingIntake, Intake};
 use super::motion::StepInputs;
-use crate::pipeline::estimator::{write_innovations, write_parameters};
 use crate::pipeline::judge::{InputState, Judgement, StatusInputs};
 use crate::pipeline::motion::{PositionNoise, SpeedRange};
+use crate::pipeline::output::{write_innovations, write_parameters};
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 
 /// Memory of the innovation statistics, in innovations.
@@ -45,7 +45,7 @@ pub struct BrakingEstimator<E> {
 const RAIL_LIMIT_SIGMAS: f64 = 2.0;
 
 impl BrakingSettings {
-    /// The estimator of a kind around an engine.
+    /// Returns the estimator of a kind around an engine.
     pub fn estimator<E: Engine + 'static>(
         &self,
         kind: PipelineKind,
@@ -126,7 +126,7 @@ impl<E: Engine> BrakingEstimator<E> {
         !self.is_current || age_s > self.settings.stale_after_s
     }
 
-    /// True when the rail carries less than the brake would need, so that the coefficient is that
+    /// Returns whether the rail carries less than the brake would need, so that the coefficient is that
     /// of the rail and not only a lower bound of it.
     fn is_rail_limited(&self, estimate: &BrakingEstimate) -> bool {
         if let Some(probability) = estimate.brake_limited {

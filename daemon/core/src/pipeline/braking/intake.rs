@@ -1,4 +1,4 @@
-//! From the train's samples to the observations and steps of a braking, and from cylinder pressure to brake force.
+//! Observations and steps of a braking from the train's samples, and brake force from cylinder pressure.
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{BrakeGear, Davis, TrainModel};
@@ -104,7 +104,7 @@ struct Braking {
 }
 
 impl BrakingIntake {
-    /// An intake for a train as declared.
+    /// Returns an intake for a train as declared.
     pub fn new(
         quantity: BrakingCoefficient,
         settings: BrakingSettings,
@@ -193,7 +193,7 @@ impl BrakingIntake {
         }))
     }
 
-    /// The force that the brake exerts as far as the rail carries it: from the cylinder pressure
+    /// Returns the force that the brake exerts as far as the rail carries it: from the cylinder pressure
     /// and the declared gear; for adhesion else the reported brake force.
     fn brake_force_n(&self, sample: &ResolvedSample) -> Option<f64> {
         let by_pressure = self
@@ -228,7 +228,7 @@ pub struct DeclaredGear {
 }
 
 impl DeclaredGear {
-    /// The gear, `None` while a quantity is not declared or not positive.
+    /// Returns the gear, `None` while a quantity is not declared or not positive.
     pub fn of(gear: &BrakeGear) -> Option<Self> {
         let positive = |value: Option<f64>| value.filter(|v| v.is_finite() && *v > 0.0);
         let diameter_m = 1e-3 * positive(gear.cylinder_diameter_mm)?;

@@ -3,11 +3,11 @@
 //!
 //! # Layout
 //!
-//! - [`motion`]: the braking train
+//! - [`law`], [`motion`]: the braking train
 //! - [`intake`]: from the train's samples to observations and steps of a braking
-//! - [`engine`]: what the estimators have in common
+//! - [`engine`]: common parts of the estimators
 //! - [`tracker`]: the papers' extended Kalman filter, and our fixed-lag smoother
-//! - [`law_bank`]: laws of the coefficient over speed, scaled and weighed by evidence
+//! - [`law_bank`]: known laws, scaled and weighed by evidence
 //! - [`estimator`]: from an engine to a snapshot
 //! - [`settings`]: the pipelines by name
 //!
@@ -16,6 +16,7 @@
 pub mod engine;
 pub mod estimator;
 pub mod intake;
+pub mod law;
 pub mod law_bank;
 pub mod motion;
 pub mod settings;

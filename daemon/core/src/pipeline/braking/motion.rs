@@ -12,7 +12,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::law_bank::BrakingLaw;
+use super::law::BrakingLaw;
 
 /// Place in the state of the distance in m since the brakes came on.
 pub const DISTANCE: usize = 0;
@@ -41,7 +41,7 @@ pub struct StepInputs {
 }
 
 impl StepInputs {
-    /// Deceleration by everything but the brake in m/s², and its derivative by speed.
+    /// Returns the deceleration by everything but the brake in m/s², and its derivative by speed.
     #[inline]
     pub fn resistance_mps2(&self, speed_mps: f64) -> (f64, f64) {
         let [a, b, c] = self.basic_mps2;
@@ -79,7 +79,7 @@ pub enum Walk {
 }
 
 impl Walk {
-    /// Share of the drift that is left after a step, and the time in s over which it acted.
+    /// Returns the share of the drift that is left after a step, and the time in s over which it acted.
     #[inline]
     fn drift_transition(self, step_s: f64) -> (f64, f64) {
         match self {
@@ -91,7 +91,7 @@ impl Walk {
         }
     }
 
-    /// Standard deviation of the drift beforehand, in 1/s.
+    /// Returns the standard deviation of the drift beforehand, in 1/s.
     pub fn drift_std_per_s(self) -> f64 {
         match self {
             Walk::Scale(_) => 0.0,
@@ -137,7 +137,7 @@ pub fn advance_under(
     }
 }
 
-/// Mean of the state after a step, and the Jacobian.
+/// Returns the mean of the state after a step, and the Jacobian.
 pub fn predict(
     inputs: &StepInputs,
     law: &BrakingLaw,
@@ -189,7 +189,7 @@ pub fn move_covariance(
     moved
 }
 
-/// Covariance that a step adds.
+/// Returns the covariance that a step adds.
 pub fn process_noise(noise: &MotionNoise, walk: Walk, step_s: f64) -> SMatrix<f64, STATES, STATES> {
     let mut added = SMatrix::<f64, STATES, STATES>::zeros();
     added[(DISTANCE, DISTANCE)] = noise.distance_m2_per_s * step_s;

@@ -6,7 +6,8 @@ use serde::Deserialize;
 
 pub use super::engine::BrakingSettings;
 use super::intake::{BrakingCoefficient, DeclaredGear};
-use super::law_bank::{BrakingLaw, LawBank, SpeedTable};
+use super::law::{BrakingLaw, SpeedTable};
+use super::law_bank::LawBank;
 use super::motion::Walk;
 use super::tracker::{PriorScale, Tracker, TrackerModel};
 use crate::pipeline::Estimator;
@@ -26,7 +27,7 @@ pub enum BrakeFactor {
 }
 
 impl BrakeFactor {
-    /// The coefficient that it is.
+    /// Returns the coefficient that it is.
     pub fn quantity(self) -> BrakingCoefficient {
         match self {
             BrakeFactor::Friction => BrakingCoefficient::Friction,
@@ -38,7 +39,7 @@ impl BrakeFactor {
 /// Adhesion that stands for a declared one where nothing is declared.
 const ADHESION_REFERENCE: f64 = 0.1;
 
-/// The declared value of a quantity.
+/// Returns the declared value of a quantity.
 fn declared(quantity: BrakingCoefficient, train: &TrainModel) -> Option<f64> {
     let gear = DeclaredGear::of(&train.brake_gear);
     match quantity {
@@ -176,7 +177,7 @@ settings! {
 const SHARE_PRIOR: Uncertain = Uncertain::new(1.0, 1.0);
 
 impl SmootherSettings {
-    /// How the share wanders.
+    /// Returns how the share wanders.
     ///
     /// Unless set: adhesion drifts as both rail laws do at full braking, by about half a percent
     /// of the demand per second in one direction throughout; disc friction drifts faster and by

@@ -7,7 +7,7 @@ use dynocar_shared::Uncertain;
 use nalgebra::{SMatrix, SVector};
 
 use super::engine::{BrakingEstimate, BrakingObservation, BrakingSettings, Engine, EngineStep};
-use super::law_bank::BrakingLaw;
+use super::law::BrakingLaw;
 use super::motion::{self, DISTANCE, MotionNoise, SCALE, SPEED, STATES, StepInputs, Walk};
 use crate::filter::fixed_lag::FixedLagSmoother;
 use crate::filter::{Gaussian, NotPositiveDefinite};
@@ -38,13 +38,13 @@ pub struct TrackerModel {
 }
 
 impl TrackerModel {
-    /// The model of a law with the noise of the settings.
+    /// Returns the model of a law with the noise of the settings.
     pub fn new(settings: &BrakingSettings, law: BrakingLaw, walk: Walk, prior: PriorScale) -> Self {
         let first_speed_std_mps = settings.first_speed_std_mps;
         TrackerModel { law, noise: settings.noise(), walk, first_speed_std_mps, prior }
     }
 
-    /// The belief about the scale beforehand, at a speed in m/s and a demand.
+    /// Returns the belief about the scale beforehand, at a speed in m/s and a demand.
     pub fn prior_scale(&self, speed_mps: f64, demand: f64) -> Uncertain {
         match self.prior {
             PriorScale::OfLaw(scale) => scale,
@@ -55,7 +55,7 @@ impl TrackerModel {
         }
     }
 
-    /// The belief after a first observation.
+    /// Returns the belief after a first observation.
     pub fn initial(&self, first: &BrakingObservation) -> Gaussian<STATES> {
         let scale = self.prior_scale(first.speed_mps, first.demand);
         Gaussian::independent(
@@ -83,7 +83,7 @@ impl TrackerModel {
         jacobian
     }
 
-    /// Measured components with their values and noise variances, in order.
+    /// Returns the measured components with their values and noise variances, in order.
     pub fn measurements(&self, observed: &BrakingObservation) -> [Option<(usize, f64, f64)>; 2] {
         let distance = (DISTANCE, observed.distance_m, self.noise.measured_distance_m2);
         let speed = self
@@ -94,7 +94,7 @@ impl TrackerModel {
         [Some(distance), speed]
     }
 
-    /// The estimate that a belief about the state implies.
+    /// Returns the estimate that a belief about the state implies.
     pub fn estimate(&self, state: &Gaussian<STATES>, demand: f64) -> BrakingEstimate {
         let (shape, shape_slope) = self.law.at(state.mean[SPEED], demand);
         let scale = state.mean[SCALE];
@@ -161,7 +161,7 @@ pub struct Tracker {
 }
 
 impl Tracker {
-    /// A tracker whose estimate lies `lag_s` back, with room for `lag_moments` observations in
+    /// Returns a tracker whose estimate lies `lag_s` back, with room for `lag_moments` observations in
     /// that time.
     pub fn new(model: TrackerModel, lag_s: f64, lag_moments: usize, detects_changes: bool) -> Self {
         Tracker {
@@ -176,7 +176,7 @@ impl Tracker {
         }
     }
 
-    /// The state after the last observation; `None` before the first.
+    /// Returns the state after the last observation; `None` before the first.
     pub fn state(&self) -> Option<&Gaussian<STATES>> {
         self.state.as_ref()
     }

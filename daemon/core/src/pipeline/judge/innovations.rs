@@ -1,4 +1,4 @@
-//! Whether the innovations of an estimator look as its covariance says.
+//! Consistency of an estimator's innovations with its covariance.
 
 use dynocar_shared::Reason;
 
@@ -14,12 +14,12 @@ pub const LONG_RUN_MAX: f64 = 4.0;
 /// Standard deviations by which a statistic must leave what white innovations make of it.
 const CHANCE_DEVIATIONS: f64 = 4.0;
 
-/// True when a mean square says that innovations are larger than the covariance has it.
+/// Returns whether a mean square says that innovations are larger than the covariance has it.
 pub fn are_too_large(mean_square: f64) -> bool {
     mean_square > MEAN_SQUARE_MAX
 }
 
-/// True when mean square and lag-1 correlation say that innovations follow each other: by their
+/// Returns whether mean square and lag-1 correlation say that innovations follow each other: by their
 /// covariance, or by the variance of their sums over that of as many white ones of the expected
 /// size, if the correlation fades from lag to lag as it does over the first.
 pub fn are_alike(mean_square: f64, correlation: f64) -> bool {
@@ -27,7 +27,7 @@ pub fn are_alike(mean_square: f64, correlation: f64) -> bool {
         || long_run_variance(mean_square, correlation) > LONG_RUN_MAX
 }
 
-/// Variance of sums of innovations over that of as many white ones of the expected size, if their
+/// Returns the variance of sums of innovations over that of as many white ones of the expected size, if their
 /// correlation fades from lag to lag as it does over the first.
 pub fn long_run_variance(mean_square: f64, correlation: f64) -> f64 {
     mean_square * (1.0 + correlation) / (1.0 - correlation).max(f64::EPSILON)
@@ -48,7 +48,7 @@ pub struct InnovationMonitor {
 }
 
 impl InnovationMonitor {
-    /// A monitor that looks back over about `memory` innovations.
+    /// Returns a monitor that looks back over about `memory` innovations.
     pub fn new(memory: u32) -> Self {
         InnovationMonitor {
             forgetting: 1.0 - 1.0 / f64::from(memory.max(2)),
@@ -80,12 +80,12 @@ impl InnovationMonitor {
         self.last = 0.0;
     }
 
-    /// The newest normalised innovation.
+    /// Returns the newest normalised innovation.
     pub fn last(&self) -> f64 {
         self.last
     }
 
-    /// Mean square of the normalised innovations; 0 before the first.
+    /// Returns the mean square of the normalised innovations; 0 before the first.
     pub fn mean_square(&self) -> f64 {
         self.mean_square
     }
@@ -99,12 +99,12 @@ impl InnovationMonitor {
         }
     }
 
-    /// The number of innovations that the averages rest on.
+    /// Returns the number of innovations that the averages rest on.
     pub fn effective_count(&self) -> f64 {
         self.weight
     }
 
-    /// True when they are larger than the covariance says, and by more than chance.
+    /// Returns whether they are larger than the covariance says, and by more than chance.
     pub fn are_too_large(&self) -> bool {
         let chance = CHANCE_DEVIATIONS * (2.0 / self.weight).sqrt();
         are_too_large(self.mean_square) && self.mean_square > 1.0 + chance

@@ -1,9 +1,9 @@
-//! One judge of what an estimate may be used for, whichever estimator it is from.
+//! The one judge of an estimate's use, for every estimator.
 //!
 //! - [`InnovationMonitor`]: whether the innovations are as large and as white as the covariance says
 //! - [`LackOfFit`]: whether a force that no parameter explains stays
 //! - [`StatusInputs`]: all that is known of an estimate, and the verdict on it
-//! - [`InputState`], [`Judgement`]: what an estimator is given to judge by, and its answer
+//! - [`InputState`], [`Judgement`]: the state of its input for an estimator, and its answer
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_shared::{Reason, Status};
@@ -120,7 +120,7 @@ impl LackOfFit {
         self.share += (f64::from(is_seen) - self.share) / self.looks;
     }
 
-    /// True when the model did not fit for a good part of the time.
+    /// Returns whether the model did not fit for a good part of the time.
     pub fn is_lasting(&self) -> bool {
         self.looks >= LOOKS_MIN && self.share > LASTING_MIN
     }

@@ -55,17 +55,17 @@ pub struct MomentumBlocks {
 }
 
 impl MomentumBlocks {
-    /// A builder without samples.
+    /// Returns a builder without samples.
     pub fn new(settings: DataSettings) -> Self {
         MomentumBlocks { settings, watch: SpeedWatch::new(settings.spike_mps), chain: None }
     }
 
-    /// Noise of the speed so far.
+    /// Returns the noise of the speed so far.
     pub fn noise(&self) -> &SpeedNoise {
         &self.watch.noise
     }
 
-    /// Time in ns of the first sample of the chain; `None` between chains.
+    /// Returns the time in ns of the first sample of the chain; `None` between chains.
     pub fn chain_start_ns(&self) -> Option<i64> {
         self.chain.as_ref().map(|chain| chain.start_ns)
     }
@@ -196,7 +196,7 @@ impl Block {
         self.speed_max_mps = self.speed_max_mps.max(now.speed_mps);
     }
 
-    /// Variance of the impulse by what is not known of when and where the forces acted.
+    /// Returns the variance of the impulse by what is not known of when and where the forces acted.
     fn impulse_variance(&self, last: &UnitSample, settings: &DataSettings) -> f64 {
         let speed_mps = (self.speed_sum / self.rest.count()).max(settings.speed_min_mps);
         let place = settings.position_std_m / speed_mps * (last.known - self.first.known);

@@ -1,4 +1,4 @@
-//! Momentum against the impulse of the forces: what every estimator of resistance learns from.
+//! Momentum against the impulse of the forces: the data of every estimator of resistance.
 //!
 //! In momentum per weight, with s = 1000 (1 + gamma) / g, the declared model reads
 //! `s dv/dt = f(t) - w0(v)`, f being the driving force in N per kN of weight (Liu 2018, eq. 5,
@@ -6,8 +6,8 @@
 //! and c whatever window it is integrated over.
 //!
 //! - [`UnitSample`], [`SpeedWatch`]: forces per weight; spikes refused, noise of the speed learned
-//! - [`blocks`]: samples to blocks, the impulse between them, and what each unknown takes off it
-//! - [`Disturbance`]: what a small unknown force leaves of one block's momentum in the next
+//! - [`blocks`]: samples to blocks, the impulse between them, and the share of each unknown in it
+//! - [`Disturbance`]: the correlation of blocks by a small unknown force
 //! - [`DataSettings`]: how samples become such data
 
 use dynocar_model::force::ResolvedSample;
@@ -42,7 +42,7 @@ pub const SPEED_SCALE_MPS: f64 = 20.0;
 /// Known part and regressors by column.
 pub type MomentumColumns = SVector<f64, COLUMNS>;
 
-/// The scaled regressors of w0 at a speed in m/s.
+/// Returns the scaled regressors of w0 at a speed in m/s.
 pub fn regressors(speed_mps: f64) -> [f64; PARAMETERS] {
     let scaled = speed_mps / SPEED_SCALE_MPS;
     [1.0, scaled, scaled * scaled]
@@ -58,7 +58,7 @@ pub fn unscaling() -> Vector3<f64> {
     Vector3::new(1.0, 1.0 / SPEED_SCALE_MPS, 1.0 / (SPEED_SCALE_MPS * SPEED_SCALE_MPS))
 }
 
-/// Seconds since the last time, which the new one replaces; none at first, or when time does not grow.
+/// Returns the seconds since the last time, which the new one replaces; none at first, or when time does not grow.
 pub fn gap_s(last_ns: &mut Option<i64>, time_ns: i64) -> Option<f64> {
     let gap_s = time_ns.saturating_sub(last_ns.replace(time_ns)?) as f64 * 1e-9;
     (gap_s > 0.0).then_some(gap_s)
@@ -154,7 +154,7 @@ impl Disturbance {
     }
 }
 
-/// A block's momentum, seen with the variance that the speed's noise gives it.
+/// Returns a block's momentum, seen with the variance that the speed's noise gives it.
 pub fn momentum_seen<const C: usize>(momentum: f64, variance: f64) -> Sighting<STATES, C> {
     let mut observed = SVector::zeros();
     observed[0] = momentum;
@@ -222,7 +222,7 @@ pub struct UnitSample {
 }
 
 impl UnitSample {
-    /// The forces of a sample per weight.
+    /// Returns the forces of a sample per weight.
     ///
     /// # Errors
     ///
@@ -247,7 +247,7 @@ impl UnitSample {
         })
     }
 
-    /// Time in s since another sample.
+    /// Returns the time in s since another sample.
     pub fn seconds_since(&self, earlier: &UnitSample) -> f64 {
         (self.time_ns - earlier.time_ns) as f64 * 1e-9
     }
@@ -274,7 +274,7 @@ pub struct SpeedWatch {
 }
 
 impl SpeedWatch {
-    /// A watch that never calls a deviation below `spike_mps` a spike.
+    /// Returns a watch that never calls a deviation below `spike_mps` a spike.
     pub fn new(spike_mps: f64) -> Self {
         // A level that was never called a spike is taken to be three standard deviations at the start.
         let noise = SpeedNoise::unknown(spike_mps / 3.0);
@@ -309,7 +309,7 @@ pub fn resistance_integral(known: &Davis, regressor_integrals: &[f64]) -> f64 {
 pub(super) mod tests {
     use super::*;
 
-    /// A sample of a train with s = 100 N/kN per m/s².
+    /// Returns a sample of a train with s = 100 N/kN per m/s².
     pub fn unit_sample(time_s: f64, speed_mps: f64, driving: f64) -> UnitSample {
         UnitSample {
             time_ns: (time_s * 1e9).round() as i64,
@@ -323,7 +323,7 @@ pub(super) mod tests {
         }
     }
 
-    /// Speeds of a train under constant driving force, every `step_s`, by small Euler steps.
+    /// Returns the speeds of a train under constant driving force, every `step_s`, by small Euler steps.
     pub fn driven(davis: &Davis, speed_mps: f64, driving: f64, step_s: f64) -> Vec<UnitSample> {
         let mut speed_mps = speed_mps;
         let ticks = 1000;

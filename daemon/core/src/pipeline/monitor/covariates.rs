@@ -31,7 +31,7 @@ impl RunClock {
     }
 }
 
-/// The retarding force in N/kN of one unit of each column.
+/// Returns the retarding force in N/kN of one unit of each column.
 pub fn covariates(
     sample: &ResolvedSample,
     unit: &UnitSample,
@@ -152,7 +152,7 @@ pub struct PlaceMemory {
 }
 
 impl PlaceMemory {
-    /// An empty memory; its only allocation.
+    /// Returns an empty memory; its only allocation.
     pub fn new() -> Self {
         PlaceMemory { cells: vec![Cell { index: i64::MIN, ..Cell::default() }; CELLS], pass: 1 }
     }

@@ -15,7 +15,6 @@ use super::suspects::{
 };
 use super::verdict::{MonitorVerdict, ResidualEvidence};
 use super::wheel_scale::WheelScale;
-use crate::pipeline::estimator::{write_innovations, write_parameters};
 use crate::pipeline::judge::{InputState, Judgement, StatusInputs};
 use crate::pipeline::momentum::blocks::MomentumBlocks;
 use crate::pipeline::momentum::{
@@ -23,6 +22,7 @@ use crate::pipeline::momentum::{
     unscaling,
 };
 use crate::pipeline::motion::{STANDING_MPS, SpeedRange, is_same_mass};
+use crate::pipeline::output::{write_innovations, write_parameters};
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 
@@ -79,7 +79,7 @@ pub struct ResidualMonitor {
 }
 
 impl ResidualMonitor {
-    /// A monitor of a train.
+    /// Returns a monitor of a train.
     ///
     /// # Errors
     ///
@@ -162,7 +162,7 @@ impl ResidualMonitor {
         self.verdict.clear(parameter);
     }
 
-    /// How far a parameter may be from nothing; of the base model's a named one further than usual.
+    /// Returns how far a parameter may be from nothing; of the base model's a named one further than usual.
     fn prior_std(&self, parameter: usize) -> f64 {
         let prior_std = suspect_of(parameter).prior_std;
         match self.base_std.get(parameter) {

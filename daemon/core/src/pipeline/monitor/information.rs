@@ -75,7 +75,7 @@ pub struct Alternative {
 }
 
 impl Alternative {
-    /// A parameter of so much information and right side, and a prior standard deviation.
+    /// Returns a parameter of so much information and right side, and a prior standard deviation.
     fn of(own: f64, rest: f64, prior_std: f64) -> Self {
         let prior = prior_std * prior_std;
         let precision = own + 1.0 / prior;
@@ -90,19 +90,19 @@ impl Alternative {
 }
 
 impl BaseSolution {
-    /// A parameter of the base model: value and variance.
+    /// Returns a parameter of the base model: value and variance.
     pub fn parameter(&self, index: usize) -> (f64, f64) {
         let unit = BaseVector::from_fn(|i, _| if i == index { 1.0 } else { 0.0 });
         let solved = self.forward(unit);
         (solved.dot(&self.reduced), solved.norm_squared())
     }
 
-    /// Standard deviation of a parameter of the base model before the rows.
+    /// Returns the standard deviation of a parameter of the base model before the rows.
     pub fn usual_std(&self, index: usize) -> f64 {
         self.prior_variance[index].sqrt()
     }
 
-    /// A parameter of the base model that may be unusual, by a standard deviation beyond the usual one: as
+    /// Returns a parameter of the base model that may be unusual, by a standard deviation beyond the usual one: as
     /// it then is; and twice the log-likelihood ratio of that against a usual one, and what it costs.
     pub fn unusual(&self, index: usize, more_std: f64) -> (Alternative, (f64, f64)) {
         let (value, variance) = self.parameter(index);
@@ -140,7 +140,7 @@ impl BaseSolution {
         column
     }
 
-    /// A suspect given the base model.
+    /// Returns a suspect given the base model.
     pub fn alternative(&self, parameter: usize, prior_std: f64) -> Alternative {
         let index = parameter - BASE;
         Alternative::of(self.own[index], self.rest[index], prior_std)
@@ -162,7 +162,7 @@ impl BaseSolution {
 }
 
 impl Believed<'_> {
-    /// Variance of a sum of parameters by what the rows leave open.
+    /// Returns the variance of a sum of parameters by what the rows leave open.
     pub fn variance_of(&self, weights: &ParameterVector) -> f64 {
         let reduced = self.base.forward(weights.fixed_rows::<BASE>(0).into_owned());
         let by_suspect = self.suspect.map_or(0.0, |(index, variance)| {
@@ -254,7 +254,7 @@ impl MonitorInformation {
         Ok(BaseSolution { factor, reduced, columns, own, rest, prior_variance })
     }
 
-    /// A suspect given the base model and another suspect, both as free as their priors let them be.
+    /// Returns a suspect given the base model and another suspect, both as free as their priors let them be.
     pub fn beyond_another(
         &self,
         base: &BaseSolution,
@@ -269,7 +269,7 @@ impl MonitorInformation {
         Alternative::of(left, base.rest[own] - share * base.rest[taken], prior_std)
     }
 
-    /// Mean square of what base model and a suspect of such a ratio leave of the rows.
+    /// Returns the mean square of what base model and a suspect of such a ratio leave of the rows.
     pub fn mean_square(&self, base: &BaseSolution, ratio: f64, prior_rows: f64) -> f64 {
         let rest = (self.square_sum - base.reduced.norm_squared() - ratio).max(0.0);
         (rest + prior_rows) / (self.count + prior_rows)
@@ -279,7 +279,7 @@ impl MonitorInformation {
 /// Standard deviation of a curve constant of which nothing is declared, in 1000 N/kN m.
 const CURVE_STD_MIN: f64 = 0.02;
 
-/// The base model of a train before the rows: the declared a, b, c, scaled, as base parameters, and
+/// Returns the base model of a train before the rows: the declared a, b, c, scaled, as base parameters, and
 /// standard deviations of what each base parameter lacks.
 ///
 /// # Errors

@@ -1,4 +1,4 @@
-//! The pipeline `residual_monitor`: which force the model does not explain, and what it may be.
+//! The pipeline `residual_monitor`: the force that the model does not explain, and its likely effects.
 //!
 //! Momentum blocks make a linear regression in a, b, c and what is not exactly known of the
 //! forces, as in [`crate::pipeline::momentum`]. Each suspect adds one column: what one unit of
@@ -13,8 +13,8 @@
 //! - `covariates`, `wheel_scale`: evidence of a sample on each of them
 //! - `rows`: blocks to independent rows of unit variance
 //! - `information`: how far off everything may be, and the likelihood ratios
-//! - `verdict`: what speaks for each of them
-//! - `naming`: who is suspected, what is hardly distinguishable from it, and when it has ended
+//! - `verdict`: the evidence for each of them
+//! - `naming`: the suspect, its alternatives, and the end of the suspicion
 //! - `estimator`: the pipeline around all of it
 
 use dynocar_model::terms::{bearings, curve, masses};

@@ -1,4 +1,4 @@
-//! From evidence to a name, to alternatives, and to the end of a suspicion.
+//! Naming a suspected effect and its alternatives, and ending the suspicion.
 
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -45,7 +45,7 @@ pub struct Named {
 }
 
 impl Named {
-    /// Its parameter of the regression, if it is a force.
+    /// Returns its parameter of the regression, if it is a force.
     pub fn parameter(&self) -> Option<usize> {
         self.candidate.filter(|&candidate| candidate < PARAMETERS && candidate != FORCE_DELAY)
     }
@@ -89,29 +89,29 @@ impl Naming {
         Naming { evidence_min, named: None, leading: (None, 0), ending: 0.0, let_go: 0.0 }
     }
 
-    /// The suspect, if any.
+    /// Returns the suspect, if any.
     pub fn named(&self) -> Option<&Named> {
         self.named.as_ref()
     }
 
-    /// The parameter of the suspect, if any.
+    /// Returns the parameter of the suspect, if any.
     pub fn parameter(&self) -> Option<usize> {
         self.named.and_then(|named| named.parameter())
     }
 
-    /// The onset that is named as that of a dragging brake.
+    /// Returns the onset that is named as that of a dragging brake.
     pub fn onset(&self) -> Option<usize> {
         self.parameter()?.checked_sub(FIRST_ONSET)
     }
 
-    /// True when a parameter is named, and no other that is known could be meant: its rows should
+    /// Returns whether a parameter is named, and no other that is known could be meant: its rows should
     /// be integrated out, and not taken as without it.
     pub fn is_clearly(&self, parameter: usize) -> bool {
         let is_clear = |it: Named| it.alternatives & !EffectKind::Unknown.bit() == 0;
         self.named.is_some_and(|it| it.parameter() == Some(parameter) && is_clear(it))
     }
 
-    /// True when something is named that is no place and cannot be one.
+    /// Returns whether something is named that is no place and cannot be one.
     pub fn is_no_place(&self) -> bool {
         use EffectKind::{DraggingBrake, GradientError, LocalResistance, Unknown};
         self.named.is_some_and(|named| match named.effect {
@@ -171,7 +171,7 @@ impl Naming {
         };
     }
 
-    /// A candidate as it is reported.
+    /// Returns a candidate as it is reported.
     fn named_from(&self, candidate: usize, least: f64, standing: &CandidateEvidence) -> Named {
         let effect = effect_of(candidate);
         let mut bits = alternatives(candidate, least, standing);
@@ -205,7 +205,7 @@ impl Naming {
         }
     }
 
-    /// Innovations larger than small things explain, and no suspect; what earlier segments spoke for
+    /// Returns the innovations larger than small things explain, and no suspect; what earlier segments spoke for
     /// may be behind it, or a place that was never passed.
     fn unknown(&self, standing: &CandidateEvidence) -> Option<Named> {
         let evidence = self.unexplained(standing)?;
@@ -231,13 +231,13 @@ impl Naming {
     }
 }
 
-/// The bits of the effects of those candidates that are so.
+/// Returns the bits of the effects of those candidates that are so.
 fn bits_of(is_so: impl Fn(usize) -> bool) -> u32 {
     let so = (0..CANDIDATES).filter(|&candidate| is_so(candidate));
     so.fold(0, |bits, candidate| bits | effect_of(candidate).bit())
 }
 
-/// The effects that are hardly distinguishable from the chosen one: by their evidence, or by what they are.
+/// Returns the effects that are hardly distinguishable from the chosen one: by their evidence, or by what they are.
 fn alternatives(chosen: usize, least: f64, standing: &CandidateEvidence) -> u32 {
     let CandidateEvidence { net, rank, .. } = *standing;
     let effect = effect_of(chosen);

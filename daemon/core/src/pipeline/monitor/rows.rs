@@ -107,7 +107,7 @@ impl Rows {
         Some(DesignRow { features, observed, weight })
     }
 
-    /// The small forces that are no effect.
+    /// Returns the small forces that are no effect.
     fn small_forces(&self, block: &MomentumBlock) -> Disturbance {
         let w0_n_per_kn = self.declared.w0_n_per_kn(block.speed_mps);
         let gust_n_per_kn = 2.0 * self.declared.c * block.speed_mps * self.gust_mps;
@@ -120,7 +120,7 @@ impl Rows {
         self.whitener.clear_column(1 + parameter);
     }
 
-    /// The disturbance now: known part, what each parameter takes off it, variance.
+    /// Returns the disturbance now: known part, what each parameter takes off it, variance.
     pub fn disturbance(&self) -> (f64, ParameterVector, f64) {
         let state = self.whitener.state;
         let taken = ParameterVector::from_fn(|i, _| state[(DISTURBANCE, 1 + i)]);

@@ -53,7 +53,7 @@ pub const CANDIDATES: usize = PARAMETERS + 1;
 /// Candidates among them.
 pub const SEARCHED: usize = UNUSUAL.len() + 1 + CANDIDATES - BASE;
 
-/// The suspect behind a column from samples.
+/// Returns the suspect behind a column from samples.
 pub fn covariate(index: usize) -> &'static Suspect {
     if index < USUAL.len() { &USUAL[index] } else { &BANK[index - USUAL.len()] }
 }
@@ -68,7 +68,7 @@ pub fn suspect_of(parameter: usize) -> &'static Suspect {
     }
 }
 
-/// The effect behind a candidate.
+/// Returns the effect behind a candidate.
 pub fn effect_of(candidate: usize) -> EffectKind {
     match candidate {
         FORCE_DELAY => EffectKind::ActuatorDelay,
@@ -93,7 +93,7 @@ impl Onsets {
         Onsets { ages: [None; ONSETS], since_newest: SPACING }
     }
 
-    /// Age of an onset in blocks.
+    /// Returns the age of an onset in blocks.
     pub fn age(&self, index: usize) -> Option<u32> {
         self.ages[index]
     }
@@ -125,7 +125,7 @@ impl Onsets {
         Some(index)
     }
 
-    /// The onset between the two neighbours that lie closest together by the ratio of ages.
+    /// Returns the onset between the two neighbours that lie closest together by the ratio of ages.
     fn most_redundant(&self, keep: Option<usize>) -> usize {
         let ratio = |index: usize| {
             let age = self.ages[index].unwrap_or(0);
@@ -197,7 +197,7 @@ impl ReleasedPressure {
         }
     }
 
-    /// True while the released brakes hold clearly more pressure than they once did.
+    /// Returns whether the released brakes hold clearly more pressure than they once did.
     pub fn is_raised(&self) -> bool {
         self.seen_s >= SMOOTHING_S && self.mean_pa > self.lowest_pa + STEP_MIN_PA
     }

@@ -244,7 +244,7 @@ impl MonitorVerdict {
         });
     }
 
-    /// The least size of a parameter worth naming; infinite while it has not acted.
+    /// Returns the least size of a parameter worth naming; infinite while it has not acted.
     fn least(&self, parameter: usize) -> f64 {
         match suspect_of(parameter).least {
             Least::Size(least) => least,
@@ -261,7 +261,7 @@ fn searched() -> f64 {
     2.0 * (SEARCHED as f64).ln()
 }
 
-/// True when a parameter has a size that is worth naming, and a sign that makes sense.
+/// Returns whether a parameter has a size that is worth naming, and a sign that makes sense.
 fn is_there(parameter: usize, it: &Alternative, least: f64) -> bool {
     let is_possible = it.value > 0.0 || !suspect_of(parameter).is_positive;
     is_possible && it.value.abs() >= least

@@ -1,4 +1,4 @@
-//! Whether the wheels are of the declared diameter: the distance by speed against the distance by position.
+//! The wheels' diameter against the declared one: the distance by speed over the distance by position.
 //!
 //! A position that comes from the same wheel shows nothing; fixes at balises, or GNSS, do. The
 //! difference between chainage and integrated speed is `offset - error * distance`, so that a straight
@@ -120,7 +120,7 @@ impl WheelScale {
         self.product *= kept;
     }
 
-    /// The speed's scale less 1, and twice the log-likelihood ratio of one beyond what is `usual`
+    /// Returns the speed's scale less 1, and twice the log-likelihood ratio of one beyond what is `usual`
     /// against that, less what the freedom of its size costs.
     pub fn evidence(&self, usual: f64) -> (f64, f64) {
         let (information, product) = self.going.map_or((0.0, 0.0), |going| going.row.gathered());
@@ -142,7 +142,7 @@ impl DesignRow {
         self.last_offset_m = offset_m;
     }
 
-    /// Information on the error of the scale, and its product with it.
+    /// Returns the information on the error of the scale, and its product with it.
     fn gathered(&self) -> (f64, f64) {
         if self.count < 3.0 {
             return (0.0, 0.0);

@@ -2,7 +2,7 @@
 //!
 //! - [`STANDING_MPS`], [`MOVING_MPS`], [`BRIDGED_MAX_S`]: when a train stands, moves, and is lost sight of
 //! - [`Trust`], [`OutlierRow`]: how far a measured speed is believed
-//! - [`jump_variance`], [`kink_variance`]: what a trapezoid over a step misses
+//! - [`jump_variance`], [`kink_variance`]: the error of a trapezoid over a step
 //! - [`Rounding`], [`SpeedNoise`]: the steps that a speed is reported in, and its noise
 //! - [`PositionNoise`]: the noise of a measured position
 //! - [`SpeedRange`]: the speeds driven
@@ -27,7 +27,7 @@ pub const MOVING_MPS: f64 = 1.0;
 /// around them, and records at 1 Hz are used.
 pub const BRIDGED_MAX_S: f64 = REPEATED.high;
 
-/// Variance of the impulse per mass that a force brings which changes by so much from one sample to
+/// Returns the variance of the impulse per mass that a force brings which changes by so much from one sample to
 /// the next: in (m/s)² for a change in m/s², likewise in other units.
 ///
 /// Where within the step h the force changed by a is not known: at once at any moment, the trapezoid
@@ -37,7 +37,7 @@ pub fn jump_variance(change: f64, step_s: f64) -> f64 {
     (step_s * change).powi(2) / 12.0
 }
 
-/// Variance in (m/s)² that a force brings whose slope jumps between two samples, from the second
+/// Returns the variance in (m/s)² that a force brings whose slope jumps between two samples, from the second
 /// difference of its acceleration in m/s².
 ///
 /// A gradient acts over the length of the train, so that its rate is a polygon. Where the slope
@@ -78,13 +78,13 @@ impl Trust {
         Trust { normalised, weight }
     }
 
-    /// True when the speed is believed as the filter's noise has it.
+    /// Returns whether the speed is believed as the filter's noise has it.
     #[inline]
     pub fn is_full(&self) -> bool {
         self.weight == 1.0
     }
 
-    /// True when the speed is not believed.
+    /// Returns whether the speed is not believed.
     #[inline]
     pub fn is_outlier(&self) -> bool {
         self.weight == 0.0
@@ -160,7 +160,7 @@ impl SpeedRange {
         self.0 = Some((low.min(speed_mps), high.max(speed_mps)));
     }
 
-    /// Lowest and highest, in m/s; `None` before the first.
+    /// Returns the lowest and highest, in m/s; `None` before the first.
     pub fn get(&self) -> Option<(f64, f64)> {
         self.0
     }
@@ -174,7 +174,7 @@ impl SpeedRange {
 /// Masses that differ by less than this share are the same.
 const SAME_MASS_SHARE: f64 = 1e-4;
 
-/// True for a mass in kg that says no more than the one before.
+/// Returns true for a mass in kg that says no more than the one before.
 pub fn is_same_mass(before_kg: f64, now_kg: f64) -> bool {
     (now_kg / before_kg - 1.0).abs() <= SAME_MASS_SHARE
 }
@@ -198,12 +198,12 @@ impl StopWatch {
         StopWatch { stop_min_ns, last: None, standing_since_ns: None, is_due: false }
     }
 
-    /// True before the first sample.
+    /// Returns true before the first sample.
     pub fn is_first(&self) -> bool {
         self.last.is_none()
     }
 
-    /// True while the train stands for so long that the mass may have changed.
+    /// Returns whether the train stands for so long that the mass may have changed.
     pub fn is_due(&self) -> bool {
         self.is_due
     }

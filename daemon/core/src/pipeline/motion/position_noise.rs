@@ -69,7 +69,7 @@ impl PositionNoise {
         self.variance_m2 += (shared_m2 - self.variance_m2) / self.count;
     }
 
-    /// The variance of one position in m², at least that of a sensor as it is declared, which is taken
+    /// Returns the variance of one position in m², at least that of a sensor as it is declared, which is taken
     /// until the positions contradict it by more than chance.
     pub fn variance_m2(&self, declared_m2: f64) -> f64 {
         let is_known = self.count >= COUNT_MIN && self.variance_m2 > 1.5 * declared_m2;
@@ -82,7 +82,7 @@ mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng};
 
-    /// Standard deviation in m after positions with white noise of a deviation, an odometer that is
+    /// Returns the standard deviation in m after positions with white noise of a deviation, an odometer that is
     /// wrong by so much, and a jump of 300 m.
     fn learned(std_m: f64, odometer_share: f64) -> f64 {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(4);

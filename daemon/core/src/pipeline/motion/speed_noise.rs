@@ -72,12 +72,12 @@ impl SpeedNoise {
         self.variance = (self.variance + change).max(VARIANCE_MIN);
     }
 
-    /// Variance of one speed value in (m/s)²; 0 before the first scatter.
+    /// Returns the variance of one speed value in (m/s)²; 0 before the first scatter.
     pub fn variance(&self) -> f64 {
         self.variance
     }
 
-    /// Variance of the mean of `count` values that ran through `range_mps`.
+    /// Returns the variance of the mean of `count` values that ran through `range_mps`.
     ///
     /// A speed that hardly moves falls on the same step again and again, so that averaging does
     /// not lessen its rounding error.
@@ -87,7 +87,7 @@ impl SpeedNoise {
         (self.variance.max(VARIANCE_MIN) / count).max(rounding)
     }
 
-    /// Variance of one value, such that one may treat it as independent of its neighbours;
+    /// Returns the variance of one value, such that one may treat it as independent of its neighbours;
     /// `per_step_mps` is how far the speed moves from one sample to the next.
     pub fn variance_of_sample(&self, per_step_mps: f64) -> f64 {
         let variance = if self.freedom > 0.0 { self.variance } else { self.first };
@@ -136,17 +136,17 @@ impl Rounding {
         }
     }
 
-    /// The quantum in m/s; the coarsest before two different speeds.
+    /// Returns the quantum in m/s; the coarsest before two different speeds.
     pub fn quantum_mps(&self) -> f64 {
         self.quantum_mps
     }
 
-    /// Variance of rounding in (m/s)².
+    /// Returns the variance of rounding in (m/s)².
     pub fn variance(&self) -> f64 {
         self.quantum_mps * self.quantum_mps / 12.0
     }
 
-    /// Variance in (m/s)² such that one may treat a sample as independent of its neighbours, for a
+    /// Returns the variance in (m/s)² such that one may treat a sample as independent of its neighbours, for a
     /// speed of which one value has a variance, rounding included, and which moves by `per_step_mps`
     /// from one sample to the next.
     ///

@@ -16,10 +16,10 @@ use super::motion_bank::SpeedLikelihood;
 use super::motion_filter::{FORCE_DELAY, LOAD, SPEED, wind_over};
 use super::report::{Systematic, TrainKalmanReport};
 use super::step_builder::StepBuilder;
-use crate::pipeline::estimator::{DAVIS, contract_unit, write_innovations};
 use crate::pipeline::judge::{InputState, Judgement, LONG_RUN_MAX};
 use crate::pipeline::momentum::UnitSample;
 use crate::pipeline::motion::{BRIDGED_MAX_S, STANDING_MPS, SpeedRange};
+use crate::pipeline::output::{DAVIS, contract_unit, write_innovations};
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, KeptEstimate, Outcome, UseBefore};
 

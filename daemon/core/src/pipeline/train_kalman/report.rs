@@ -7,9 +7,9 @@ use nalgebra::{Matrix4, Vector4};
 
 use super::motion_bank::Published;
 use super::motion_filter::COEFFICIENTS;
-use crate::pipeline::estimator::{DAVIS_AND_MASS, excitation, write_parameters};
 use crate::pipeline::momentum::{regressors, unscaling};
 use crate::pipeline::motion::SpeedRange;
+use crate::pipeline::output::{DAVIS_AND_MASS, excitation, write_parameters};
 
 /// Index of the load factor among what is published.
 const LOAD: usize = COEFFICIENTS;

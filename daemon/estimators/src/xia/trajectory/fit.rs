@@ -162,7 +162,7 @@ pub fn integral_start(
     Some(minimise(&mut Linear(system), from, bounds, &settings)?.point)
 }
 
-/// Rows \[initial, a, b, c, -left side\] in standard deviations, every one weighted to m/s.
+/// Returns the rows \[initial, a, b, c, -left side\] in standard deviations, every one weighted to m/s.
 fn integrated_rows(
     segment: &MotionSegment<'_>,
     rule: StepRule,

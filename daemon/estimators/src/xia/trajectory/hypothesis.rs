@@ -57,7 +57,7 @@ pub struct SpeedInnovation {
 }
 
 impl JumpHypothesis {
-    /// Coefficients of given mean and standard deviations, with a speed of no meaning yet.
+    /// Returns the coefficients of given mean and standard deviations, with a speed of no meaning yet.
     pub fn new(davis: &Davis, std: &Vector3<f64>, noise: LearnedNoise) -> Self {
         JumpHypothesis {
             state: SVector::<f64, 4>::new(davis.a, davis.b, davis.c, 0.0),
@@ -71,23 +71,23 @@ impl JumpHypothesis {
         }
     }
 
-    /// The coefficients.
+    /// Returns the coefficients.
     pub fn davis(&self) -> Davis {
         Davis { a: self.state[A], b: self.state[B], c: self.state[C] }
     }
 
-    /// Covariance of the coefficients.
+    /// Returns the covariance of the coefficients.
     pub fn davis_covariance(&self) -> Matrix3<f64> {
         let lower = self.factor.0.fixed_view::<3, 3>(0, 0);
         lower * lower.transpose()
     }
 
-    /// Covariance that a disturbance of unit density would have left with the gains used.
+    /// Returns the covariance that a disturbance of unit density would have left with the gains used.
     pub fn unit_disturbance(&self) -> &UnitDisturbance {
         &self.unit
     }
 
-    /// Covariance of the coefficients over what the learned density of the disturbance leaves
+    /// Returns the covariance of the coefficients over what the learned density of the disturbance leaves
     /// open: the filter's own holds for the likeliest density.
     pub fn davis_covariance_over_noise(&self, model: &NoiseModel) -> Matrix3<f64> {
         self.davis_covariance() + self.unit.of_davis() * self.noise.density_surplus(model)
@@ -190,14 +190,14 @@ impl JumpHypothesis {
         SpeedInnovation { innovation_mps, deviation_mps, likelihood: inlier + outlier, is_used }
     }
 
-    /// True while state and covariance are numbers.
+    /// Returns whether state and covariance are numbers.
     #[inline]
     pub fn is_sound(&self) -> bool {
         self.state.sum().is_finite() && self.factor.is_sound()
     }
 }
 
-/// Mean and covariance of two hypotheses by their weights, with the weight of both; the rest is
+/// Returns the mean and covariance of two hypotheses by their weights, with the weight of both; the rest is
 /// the likelier's.
 ///
 /// The spread between them stays in the covariance: neither knows exactly when the jump was, and

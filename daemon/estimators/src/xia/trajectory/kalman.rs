@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use dynocar_core::pipeline::estimator::{DAVIS, write_parameters};
 use dynocar_core::pipeline::judge::{InputState, Judgement};
 use dynocar_core::pipeline::motion::{Rounding, SpeedRange, jump_variance};
+use dynocar_core::pipeline::output::{DAVIS, write_parameters};
 use dynocar_core::pipeline::settings::SettingError;
 use dynocar_core::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
 use dynocar_core::settings;
@@ -106,7 +106,7 @@ const UPDATES_MIN: u64 = 50;
 const INNOVATION_MEMORY: u32 = 500;
 
 impl TrajectoryKalman {
-    /// An estimator from checked settings.
+    /// Returns an estimator from checked settings.
     pub fn new(settings: OnlineSettings) -> Self {
         TrajectoryKalman {
             tracker: MotionTracker::default(),
@@ -121,7 +121,7 @@ impl TrajectoryKalman {
         }
     }
 
-    /// The filter, for tests and offline work.
+    /// Returns the filter, for tests and offline work.
     pub fn filter(&self) -> &OnlineFilter {
         &self.filter
     }

@@ -1,5 +1,5 @@
-//! From resolved samples to steps that can be integrated, and the force that the estimated model leaves
-//! unexplained, lately.
+//! Steps that can be integrated, from resolved samples, and the recent force that the estimated model leaves
+//! unexplained.
 
 use dynocar_core::pipeline::motion::MOVING_MPS;
 use dynocar_model::force::ResolvedSample;
@@ -37,7 +37,7 @@ pub struct MotionStep {
 }
 
 impl From<&MotionStep> for TrajectoryStep {
-    /// A step in time.
+    /// Returns a step in time.
     fn from(motion: &MotionStep) -> TrajectoryStep {
         TrajectoryStep {
             size: motion.duration_s,
@@ -105,7 +105,7 @@ impl MotionTracker {
 /// Time in s that the force is averaged over.
 const AVERAGING_S: f64 = 20.0;
 
-/// Variance in 1/s² of the mean unexplained acceleration over that of the measured speed.
+/// Returns the variance in 1/s² of the mean unexplained acceleration over that of the measured speed.
 ///
 /// Differences of white noise telescope: an average with gain g over steps of h has the variance
 /// R (g / h)² 2 / (2 - g).
@@ -115,7 +115,7 @@ fn variance_share(step_s: f64) -> f64 {
     density * density * 2.0 / (2.0 - gain)
 }
 
-/// The standard deviation in m/s of the measured speed that a snapshot's `unexplained_force_std_n` was computed
+/// Returns the standard deviation in m/s of the measured speed that a snapshot's `unexplained_force_std_n` was computed
 /// with, for samples that come every `step_s`.
 pub fn speed_noise_mps(unexplained_force_std_n: f64, inertial_mass_kg: f64, step_s: f64) -> f64 {
     unexplained_force_std_n / (inertial_mass_kg * variance_share(step_s).sqrt())
@@ -167,7 +167,7 @@ pub(super) mod tests {
     use super::*;
     use dynocar_model::terms::Resistance;
 
-    /// A sample of a 100 t train with γ = 0.06 and every force known.
+    /// Returns a sample of a 100 t train with γ = 0.06 and every force known.
     pub fn sample(index: u32, speed_mps: f64, control_force_n: f64) -> ResolvedSample {
         ResolvedSample {
             time_ns: i64::from(index) * 200_000_000,

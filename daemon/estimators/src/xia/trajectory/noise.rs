@@ -69,7 +69,7 @@ pub struct LearnedNoise {
 }
 
 impl LearnedNoise {
-    /// The noise before any data.
+    /// Returns the noise before any data.
     pub fn new(model: &NoiseModel) -> Self {
         LearnedNoise {
             speed_variance: model.speed_noise_mps * model.speed_noise_mps,
@@ -97,13 +97,13 @@ impl LearnedNoise {
         self.disturbance_density / (qq - rq * rq / rr - 1.0).max(LEAST_FREE_INFORMATION)
     }
 
-    /// Variance in (m/s)² that a measured speed is taken in with.
+    /// Returns the variance in (m/s)² that a measured speed is taken in with.
     #[inline]
     pub fn measured_variance(&self) -> f64 {
         self.speed_variance.max(self.rounding_variance)
     }
 
-    /// The derivative of that with respect to ln R.
+    /// Returns the derivative of that with respect to ln R.
     #[inline]
     fn measured_by_speed(&self) -> f64 {
         if self.speed_variance >= self.rounding_variance { self.speed_variance } else { 0.0 }

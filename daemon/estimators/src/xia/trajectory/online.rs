@@ -78,7 +78,7 @@ const WEIGHT_MIN: f64 = 4.248_354_255_291_589e-18;
 const JUMP_PROBABILITY_MAX: f64 = 0.496_585_303_791_409_5;
 
 impl OnlineFilter {
-    /// A filter that knows no speed yet.
+    /// Returns a filter that knows no speed yet.
     pub fn new(settings: OnlineSettings) -> Self {
         OnlineFilter {
             settings,
@@ -104,12 +104,12 @@ impl OnlineFilter {
         self.since_spawn_s = 0.0;
     }
 
-    /// The hypotheses, the oldest first.
+    /// Returns the hypotheses, the oldest first.
     pub fn hypotheses(&self) -> &[JumpHypothesis] {
         self.bank.hypotheses()
     }
 
-    /// The most probable hypothesis.
+    /// Returns the most probable hypothesis.
     pub fn likeliest(&self) -> &JumpHypothesis {
         self.bank.likeliest()
     }
@@ -195,7 +195,7 @@ impl OnlineFilter {
         self.bank.unite(older, both);
     }
 
-    /// Mean and covariance of (a, b, c) over the hypotheses that count, widened for disturbances
+    /// Returns the mean and covariance of (a, b, c) over the hypotheses that count, widened for disturbances
     /// that last.
     pub fn davis(&self) -> (Davis, Matrix3<f64>) {
         let total: f64 = self.bank.weights().iter().sum();
@@ -210,7 +210,7 @@ impl OnlineFilter {
         (Davis { a: mean[0], b: mean[1], c: mean[2] }, covariance * self.inflation())
     }
 
-    /// Factor on the covariance for disturbances that last; 1 when innovations are white.
+    /// Returns the factor on the covariance for disturbances that last; 1 when innovations are white.
     pub fn inflation(&self) -> f64 {
         self.long_run.inflation()
     }

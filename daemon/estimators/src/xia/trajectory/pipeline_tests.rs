@@ -17,7 +17,7 @@ use crate::EstimatorSettings;
 use crate::xia::newton::TrajectoryNewton;
 use crate::xia::newton::{FitMethod, TrajectoryNewtonSettings};
 
-/// The metro as declared: a fifth off in every coefficient.
+/// Returns the metro as declared: a fifth off in every coefficient.
 fn train() -> Arc<TrainModel> {
     Arc::new(TrainModel {
         name: "metro".into(),
@@ -48,7 +48,7 @@ fn feed(estimator: &mut dyn Estimator, samples: &[ResolvedSample]) -> ParameterS
     fed(estimator, samples, RejectionReason::Missing, |_| {}).0
 }
 
-/// The last snapshot and the number of samples refused for a reason; looks at each snapshot.
+/// Returns the last snapshot and the number of samples refused for a reason; looks at each snapshot.
 fn fed(
     estimator: &mut dyn Estimator,
     samples: &[ResolvedSample],
@@ -238,7 +238,7 @@ fn settings_are_read_by_name_and_unknown_names_are_refused() {
     assert!(read("kind = \"trajectory_kalman\"\nhypothesis = 4").is_err());
 }
 
-/// A train that holds a speed, within 1 m/s of it, over 20 minutes.
+/// Returns a train that holds a speed, within 1 m/s of it, over 20 minutes.
 fn cruise(seed: u64) -> Vec<ResolvedSample> {
     let mut random = random(seed);
     let mut speed_mps = 15.0;

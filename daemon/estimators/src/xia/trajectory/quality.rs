@@ -12,9 +12,9 @@
 //! covariance grows by the same factor (Newey, West 1987, with a flat kernel over blocks).
 
 use dynocar_core::pipeline::InnovationMonitor;
-use dynocar_core::pipeline::estimator::{excitation, write_innovations};
 use dynocar_core::pipeline::judge::{Judgement, LONG_RUN_MAX, StatusInputs};
 use dynocar_core::pipeline::motion::SpeedRange;
+use dynocar_core::pipeline::output::{excitation, write_innovations};
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{Manoeuvre, ParameterSnapshot, Reason, Status};
 use nalgebra::{Matrix3, Vector3};
@@ -23,7 +23,7 @@ use nalgebra::{Matrix3, Vector3};
 const W0_DEVIATION_MAX: f64 = 0.1;
 /// A coefficient is excited when the data have cut its prior standard deviation to this share.
 const EXCITED_SHARE: f64 = 0.5;
-/// Standard deviations of declared coefficients, as a share of each, or of a fifth of the
+/// Returns the standard deviations of declared coefficients, as a share of each, or of a fifth of the
 /// resistance at the train's highest speed where one is declared small or zero.
 pub fn prior_std(train: &TrainModel, relative: f64) -> Vector3<f64> {
     let davis = &train.resistance;
@@ -64,7 +64,7 @@ pub struct DavisEstimate<'a> {
 }
 
 impl DavisEstimate<'_> {
-    /// All that the judge asks for.
+    /// Returns all that the judge asks for.
     pub fn case(&self) -> StatusInputs {
         let is_finite = self.covariance.iter().all(|entry| entry.is_finite());
         let speeds_mps = self.speeds.get().filter(|_| self.is_ready);
@@ -103,7 +103,7 @@ impl DavisEstimate<'_> {
         }
     }
 
-    /// Which coefficients the data distinguished.
+    /// Returns which coefficients the data distinguished.
     pub fn excited(&self) -> [bool; 3] {
         std::array::from_fn(|i| {
             let std = self.covariance[(i, i)].max(0.0).sqrt();
@@ -185,7 +185,7 @@ impl LongRunVariance {
         self.time_s = 0.0;
     }
 
-    /// Factor on the covariance, at least 1.
+    /// Returns the factor on the covariance, at least 1.
     pub fn inflation(&self) -> f64 {
         let chance = 1.0 + SIGNIFICANCE * (2.0 / self.blocks.max(1.0)).sqrt();
         if self.blocks >= BLOCKS_MIN && self.mean_square > chance { self.mean_square } else { 1.0 }

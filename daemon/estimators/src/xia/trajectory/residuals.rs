@@ -111,7 +111,7 @@ pub struct Residuals<'a, 'b> {
 }
 
 impl<'a, 'b> Residuals<'a, 'b> {
-    /// The problem at its start `point`, with one initial speed for each segment in `initial`.
+    /// Returns the problem at its start `point`, with one initial speed for each segment in `initial`.
     ///
     /// `prior` is R and z of rows R x + z in standard deviations that are added to the
     /// residuals.
@@ -199,7 +199,7 @@ impl LeastSquares<3> for Residuals<'_, '_> {
 }
 
 impl InitialSpeed {
-    /// The best initial speed after a change of (a, b, c), by the linear model.
+    /// Returns the best initial speed after a change of (a, b, c), by the linear model.
     fn moved(&self, change: &Vector3<f64>) -> f64 {
         let [pivot, by_a, by_b, by_c, residual] = self.row;
         if pivot == 0.0 {

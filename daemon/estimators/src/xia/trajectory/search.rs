@@ -1,5 +1,4 @@
-//! The search behind a trajectory fit: coefficients and noise in turn, with what it is asked for and what
-//! it answers.
+//! The search behind a trajectory fit: coefficients and noise in turn, with its request and its answer.
 
 use dynocar_core::filter::levenberg_marquardt::{
     LeastSquares, LeastSquaresSolution, ParameterBox, SolverSettings, Termination, minimise,
@@ -29,7 +28,7 @@ pub struct RatioFit {
 }
 
 impl RatioFit {
-    /// Covariance of the coefficients by the noise that the residuals show.
+    /// Returns the covariance of the coefficients by the noise that the residuals show.
     fn covariance(&self) -> Result<Matrix3<f64>, FitError> {
         let raw = self.solution.linearisation.system.covariance().ok_or(FitError::NotDetermined)?;
         Ok(raw * (self.noise_mps / self.used_noise_mps).powi(2))
@@ -55,7 +54,7 @@ pub struct TrajectorySearch<'a, 'b> {
 }
 
 impl<'a, 'b> TrajectorySearch<'a, 'b> {
-    /// A search from the initial speeds in the buffers.
+    /// Returns a search from the initial speeds in the buffers.
     pub fn new(
         segments: &'a [MotionSegment<'a>],
         settings: &'a FitSettings,
@@ -124,7 +123,7 @@ impl<'a, 'b> TrajectorySearch<'a, 'b> {
         })
     }
 
-    /// Noise by the median absolute residual, which half the residuals cannot spoil.
+    /// Returns the noise by the median absolute residual, which half the residuals cannot spoil.
     fn median_noise_mps(&mut self, point: &Vector3<f64>) -> Result<f64, FitError> {
         let weighting = Weighting {
             speed_noise_mps: 1.0,
@@ -296,7 +295,7 @@ pub struct TrajectoryFit {
 }
 
 impl TrajectoryFit {
-    /// Standard deviation of w0 in N/kN at a speed in m/s.
+    /// Returns the standard deviation of w0 in N/kN at a speed in m/s.
     pub fn w0_std_n_per_kn(&self, speed_mps: f64) -> f64 {
         let powers = Vector3::new(1.0, speed_mps, speed_mps * speed_mps);
         (powers.transpose() * self.covariance * powers)[0].max(0.0).sqrt()

@@ -60,7 +60,7 @@ pub struct Advance {
 pub const STALL_SPEED_MPS: f64 = 0.1;
 
 impl StepRule {
-    /// The speed after a step; `None` when the train would stop within it (v'² < 0 in eq. 7).
+    /// Returns the speed after a step; `None` when the train would stop within it (v'² < 0 in eq. 7).
     #[inline]
     pub fn advance(self, step: &TrajectoryStep, davis: &Davis, speed_mps: f64) -> Option<Advance> {
         match self {

@@ -17,13 +17,13 @@ pub fn random(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
 }
 
-/// A standard normal number, by Box and Muller.
+/// Returns a standard normal number, by Box and Muller.
 pub fn normal(random: &mut ChaCha8Rng) -> f64 {
     let radius = (-2.0 * (1.0 - random.random::<f64>()).ln()).sqrt();
     radius * (std::f64::consts::TAU * random.random::<f64>()).cos()
 }
 
-/// Traction, coasting and braking between 10 and 80 m/s over rolling ground.
+/// Returns the traction, coasting and braking between 10 and 80 m/s over rolling ground.
 pub fn steps(rule: StepRule, count: usize) -> Vec<TrajectoryStep> {
     (0..count)
         .map(|i| {
@@ -37,7 +37,7 @@ pub fn steps(rule: StepRule, count: usize) -> Vec<TrajectoryStep> {
         .collect()
 }
 
-/// The speeds along steps, by the rule itself.
+/// Returns the speeds along steps, by the rule itself.
 pub fn speeds(
     rule: StepRule,
     steps: &[TrajectoryStep],
@@ -52,7 +52,7 @@ pub fn speeds(
     speeds
 }
 
-/// Samples of a metro at 5 Hz: start, traction, coasting, braking, a stop of 20 s, and again.
+/// Returns the samples of a metro at 5 Hz: start, traction, coasting, braking, a stop of 20 s, and again.
 ///
 /// `disturbance` is the root of the density of a white disturbing acceleration, in m/s² √s.
 pub fn metro(

@@ -14,7 +14,7 @@ use super::SPEED;
 pub struct UnitDisturbance(SMatrix<f64, 4, 4>);
 
 impl UnitDisturbance {
-    /// The part of a, b and c.
+    /// Returns the part of a, b and c.
     pub fn of_davis(&self) -> Matrix3<f64> {
         self.0.fixed_view::<3, 3>(0, 0).into_owned()
     }
@@ -53,7 +53,7 @@ impl UnitDisturbance {
         self.0 -= gain * taken.transpose() + taken * gain.transpose();
     }
 
-    /// The mean of two by the share of the other.
+    /// Returns the mean of two by the share of the other.
     pub fn mixed(&self, other: &UnitDisturbance, share: f64) -> UnitDisturbance {
         UnitDisturbance(self.0 * (1.0 - share) + other.0 * share)
     }
@@ -67,7 +67,7 @@ mod tests {
     use super::super::test_runs::{FAST, speeds, steps};
     use super::*;
 
-    /// The covariance after a run, with its part by the disturbance.
+    /// Returns the covariance after a run, with its part by the disturbance.
     fn covariance(density: f64) -> (Matrix3<f64>, Matrix3<f64>) {
         let rule = StepRule::Time;
         let steps = steps(rule, 400);

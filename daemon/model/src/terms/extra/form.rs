@@ -32,7 +32,7 @@ named! {
 const POWER_LEAST: f64 = 1e-3;
 
 impl Form {
-    /// The names of its numbers in `train.toml`.
+    /// Returns the names of its numbers in `train.toml`.
     pub const fn numbers(self) -> &'static [&'static str] {
         match self {
             Form::Power => &["at", "exponent"],
@@ -149,7 +149,7 @@ fn hinge(value: f64, slope: f64) -> (f64, f64) {
     if value > 0.0 { (value, slope) } else { (0.0, 0.0) }
 }
 
-/// A number with four digits, and no more zeros than it needs.
+/// Returns a number with four digits, and no more zeros than it needs.
 fn short(value: f64) -> String {
     let digits = (3 - value.abs().max(1e-9).log10().floor() as i32).clamp(0, 9) as usize;
     let text = format!("{value:.digits$}");

@@ -1,4 +1,4 @@
-//! A force, what it depends on, and what it may depend on.
+//! A force and its covariates.
 
 use super::form::Form;
 use crate::named;
@@ -25,7 +25,7 @@ pub struct ExtraResistance {
 }
 
 impl CovariateFactor {
-    /// Its value and its slope over the speed in 1/(m/s); `None` where the covariate is not known.
+    /// Returns its value and its slope over the speed in 1/(m/s); `None` where the covariate is not known.
     #[inline]
     fn at(&self, known: impl Fn(Covariate) -> Option<f64>) -> Option<(f64, f64)> {
         let (value, slope) = self.form.value_and_slope(self.numbers, known(self.of)?);
@@ -39,7 +39,7 @@ impl CovariateFactor {
         }
     }
 
-    /// Its value at a covariate, and by how much a unit of each number changes it; none where that is `NaN`.
+    /// Returns its value at a covariate, and by how much a unit of each number changes it; none where that is `NaN`.
     #[inline]
     pub fn value_and_by_numbers(&self, at: f64) -> (f64, [f64; 2]) {
         match at.is_nan() {
@@ -48,20 +48,20 @@ impl CovariateFactor {
         }
     }
 
-    /// The formula.
+    /// Returns the formula.
     pub fn law(&self) -> String {
         self.form.law(self.numbers, self.of.name())
     }
 }
 
 impl ExtraResistance {
-    /// The formula, in N/kN.
+    /// Returns the formula, in N/kN.
     pub fn law(&self) -> String {
         let factors = self.factors.iter().map(|factor| format!(" · {}", factor.law()));
         format!("{:.4} N/kN{}", self.n_per_kn, factors.collect::<String>())
     }
 
-    /// The force in N/kN and its slope over the speed, for what is known of the covariates; none
+    /// Returns the force in N/kN and its slope over the speed, for what is known of the covariates; none
     /// where one that it takes is not.
     #[inline]
     pub fn at(&self, known: impl Fn(Covariate) -> Option<f64>) -> (f64, f64) {

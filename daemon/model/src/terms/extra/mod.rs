@@ -41,7 +41,7 @@ mod tests {
     use super::*;
     use crate::train::Davis;
 
-    /// The force in N/kN at a speed by what is known at another, and at a temperature in °C.
+    /// Returns the force in N/kN at a speed by what is known at another, and at a temperature in °C.
     fn resists_n_per_kn(
         extra: &ExtraResistance,
         (known_mps, degc): (f64, Option<f64>),

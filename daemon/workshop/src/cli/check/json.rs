@@ -38,7 +38,7 @@ impl Serialize for CorrectionsAnswer<'_> {
     }
 }
 
-/// The answer to what was understood.
+/// Returns the answer to what was understood.
 pub(super) fn answer(path: &Path, understood: &Understood) -> impl Serialize {
     let errors: Vec<String> = understood.errors().map(ToString::to_string).collect();
     let first = understood.errors().next().cloned();

@@ -10,7 +10,7 @@ use super::{Understood, runs};
 use crate::run_facts;
 use dynocar::cli::text::{WIDTH, line, short, wrap};
 
-/// The whole report.
+/// Returns the whole report.
 pub(super) fn report(understood: &Understood) -> String {
     let dataset = understood.dataset.as_ref();
     let diagnostics = understood.diagnostics();
@@ -133,7 +133,7 @@ fn corrections(known: &Corrections) -> Vec<String> {
     if acting.is_empty() { vec!["none that changes anything".into()] } else { acting }
 }
 
-/// The declared resistance in kN at a few speeds, which shows a wrong unit at a glance.
+/// Returns the declared resistance in kN at a few speeds, which shows a wrong unit at a glance.
 fn resistance_at_speeds(train: &TrainModel) -> String {
     let top_mps = train.speed_max_mps().filter(|&speed| speed > 0.0).unwrap_or(120.0 / 3.6);
     let weight_kn = TrainModel::weight_kn(train.mass_kg);
@@ -216,7 +216,7 @@ fn tunnels(track: &Track) -> String {
     intervals(track.knows_tunnels(), lengths_m, &more)
 }
 
-/// How many intervals there are, their length in all, and what more is to be said.
+/// Returns how many intervals there are, their length in all, and what more is to be said.
 fn intervals(is_known: bool, lengths_m: impl ExactSizeIterator<Item = f64>, more: &str) -> String {
     match (is_known, lengths_m.len()) {
         (false, _) => "not known".into(),
@@ -264,7 +264,7 @@ fn found(track: &Track) -> String {
     text
 }
 
-/// The lowest and the highest of numbers.
+/// Returns the lowest and the highest of numbers.
 pub(super) fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
         (low.min(value), high.max(value))

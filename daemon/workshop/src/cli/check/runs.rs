@@ -1,4 +1,4 @@
-//! The runs of a dataset: what the train did, what the data are like, what to know.
+//! The runs of a dataset: motion, quality of the data, notes.
 
 use std::iter;
 
@@ -14,7 +14,7 @@ use dynocar::cli::text::{TextTable, WIDTH, short, wrap};
 
 type Read = Result<Run, DatasetError>;
 
-/// The tables and diagnostics of all runs.
+/// Returns the tables and diagnostics of all runs.
 pub(super) fn report(
     manifest: &Manifest,
     runs: &[Read],
@@ -109,7 +109,7 @@ fn data_table(runs: &[Read]) -> TextTable {
     table
 }
 
-/// Where position, gradient and forces come from, with the runs where that differs.
+/// Returns where position, gradient and forces come from, with the runs where that differs.
 fn sources(runs: &[Read]) -> String {
     let mut text = String::from("sources\n");
     for (place, name) in ["position", "gradient", "traction", "brake"].into_iter().enumerate() {
@@ -177,7 +177,7 @@ fn diagnostics(manifest: &Manifest, runs: &[Read], of_dataset: &[DatasetDiagnost
     if text.is_empty() { text } else { format!("\nnotes\n{text}") }
 }
 
-/// A time of a run: in s, as a date where it counts from 1970, or as the clock that its file shows.
+/// Returns a time of a run: in s, as a date where it counts from 1970, or as the clock that its file shows.
 fn time(manifest: &Manifest, run: &Run, time_s: f64) -> String {
     let has_format = manifest.mapping(Quantity::Time).is_some_and(|it| it.format.is_some());
     if !has_format || is_parquet(&run.file) {

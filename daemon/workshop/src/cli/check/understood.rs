@@ -30,12 +30,12 @@ pub struct Understood {
 }
 
 impl Understood {
-    /// Nothing yet of a file of this kind.
+    /// Returns nothing yet of a file of this kind.
     pub(super) fn of(kind: FileKind) -> Self {
         Understood { kind, dataset: None, train: None, track: None, daemon: None }
     }
 
-    /// The runs of a dataset, each or what is wrong with it.
+    /// Returns the runs of a dataset, each or what is wrong with it.
     fn runs(&self) -> &[Result<Run, DatasetError>] {
         self.dataset.as_ref().map_or(&[], |(_, runs)| runs)
     }

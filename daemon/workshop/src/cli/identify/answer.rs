@@ -118,13 +118,13 @@ impl EstimatorAnswer {
         })
     }
 
-    /// True when the values are more than the declared ones.
+    /// Returns whether the values are more than the declared ones.
     pub(super) fn is_known(&self) -> bool {
         !["unestimated", "invalid"].contains(&self.status)
     }
 }
 
-/// Resistance over the driven speeds in such steps.
+/// Returns the resistance over the driven speeds in such steps.
 fn resistance_points(snapshot: &ParameterSnapshot, step_mps: f64) -> Vec<ResistancePoint> {
     let (low_mps, high_mps) = (snapshot.speed_min_mps, snapshot.speed_max_mps);
     let (first, last) = ((low_mps / step_mps).ceil() as u32, (high_mps / step_mps).floor() as u32);
@@ -141,7 +141,7 @@ fn resistance_points(snapshot: &ParameterSnapshot, step_mps: f64) -> Vec<Resista
         .collect()
 }
 
-/// A step between round speeds in a unit that gives a handful of them.
+/// Returns a step between round speeds in a unit that gives a handful of them.
 fn shown_step_mps(snapshot: &ParameterSnapshot, speed_unit: Unit) -> f64 {
     let range = speed_unit.from_base(snapshot.speed_max_mps - snapshot.speed_min_mps);
     let steps = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0];

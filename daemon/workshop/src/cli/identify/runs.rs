@@ -72,7 +72,7 @@ struct RunColumn {
 }
 
 impl RunColumn {
-    /// The title for people, with a speed in their unit.
+    /// Returns the title for people, with a speed in their unit.
     fn shown(&self, speed_unit: Unit) -> String {
         let at = |speed_mps| short(speed_unit.from_base(speed_mps), 1);
         match self.at_mps {
@@ -86,7 +86,7 @@ impl RunColumn {
     }
 }
 
-/// Mean and scatter of values with standard deviations; `None` for fewer than two.
+/// Returns the mean and scatter of values with standard deviations; `None` for fewer than two.
 fn spread<'a>(estimates: impl Iterator<Item = &'a (f64, f64)> + Clone) -> Option<Spread> {
     let count = estimates.clone().count();
     if count < 2 {
@@ -104,7 +104,7 @@ fn spread<'a>(estimates: impl Iterator<Item = &'a (f64, f64)> + Clone) -> Option
     })
 }
 
-/// The parameters of an estimator by its place, and the resistance at a speed that all runs drove.
+/// Returns the parameters of an estimator by its place, and the resistance at a speed that all runs drove.
 fn quantities(runs: &[RunAnswer], index: usize) -> Vec<RunColumn> {
     let answers: Vec<&EstimatorAnswer> = runs.iter().map(|run| &run.estimators[index]).collect();
     let known = |value: &dyn Fn(&EstimatorAnswer) -> Option<(f64, f64)>| -> Vec<_> {
@@ -137,7 +137,7 @@ fn quantities(runs: &[RunAnswer], index: usize) -> Vec<RunColumn> {
     quantities
 }
 
-/// The middle of the speeds that every run with an estimate drove.
+/// Returns the middle of the speeds that every run with an estimate drove.
 fn common_speed_mps(answers: &[&EstimatorAnswer]) -> Option<f64> {
     let known = answers.iter().filter(|answer| answer.is_known());
     let (low, high) = known.filter(|answer| !answer.resistance.is_empty()).fold(
@@ -150,7 +150,7 @@ fn common_speed_mps(answers: &[&EstimatorAnswer]) -> Option<f64> {
     (low.is_finite() && low <= high).then(|| (0.5 * (low + high)).floor())
 }
 
-/// How much the runs differ, estimator by estimator.
+/// Returns how much the runs differ, estimator by estimator.
 pub(super) fn spreads(runs: &[RunAnswer]) -> Vec<EstimatorSpread> {
     let Some(first) = runs.first() else { return Vec::new() };
     let of = |(index, answer): (usize, &EstimatorAnswer)| EstimatorSpread {
@@ -163,7 +163,7 @@ pub(super) fn spreads(runs: &[RunAnswer]) -> Vec<EstimatorSpread> {
     first.estimators.iter().enumerate().map(of).collect()
 }
 
-/// A table for each estimator, a row for each run.
+/// Returns a table for each estimator, a row for each run.
 pub(super) fn report(runs: &[RunAnswer], speed_unit: Unit) -> String {
     let mut text = String::new();
     let Some(first) = runs.first() else { return text };
@@ -206,7 +206,7 @@ pub(super) fn report(runs: &[RunAnswer], speed_unit: Unit) -> String {
     text
 }
 
-/// A value and the half width of its interval, both to two digits of the latter.
+/// Returns a value and the half width of its interval, both to two digits of the latter.
 fn with_half_width(value: f64, half: f64) -> String {
     let decimals = decimals(half);
     format!("{value:.decimals$} ± {half:.decimals$}")

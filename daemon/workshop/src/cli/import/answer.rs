@@ -19,7 +19,7 @@ use crate::report::provenance::for_shell;
 use crate::run_facts::diagnostics;
 use dynocar::cli::text::{TextTable, entry};
 
-/// The `train.toml`; what the file does not give and nobody says is a marked default.
+/// Returns the `train.toml`; what the file does not give and nobody says is a marked default.
 ///
 /// # Errors
 ///
@@ -55,7 +55,7 @@ fn origin(account: &Account, wanted: &str) -> String {
     format!("from {}", fields.collect::<Vec<_>>().join(" and "))
 }
 
-/// The `track.toml`; a list that the file does not give is left out, with the reason.
+/// Returns the `track.toml`; a list that the file does not give is left out, with the reason.
 pub fn track(line: &ImportedLine) -> String {
     let words = format!(
         "The line. Written by dynocar import from {}. A list that is left out is not known; an empty \

@@ -1,4 +1,4 @@
-//! The command line of `dynocar init`, and what nobody has said there, asked of whoever sits at a terminal.
+//! The command line of `dynocar init`; it asks for missing facts at a terminal.
 
 use std::io::{IsTerminal, stderr, stdin};
 use std::path::{Path, PathBuf};
@@ -47,18 +47,18 @@ pub struct InitArguments {
 }
 
 impl InitArguments {
-    /// The folder.
+    /// Returns the folder.
     pub fn folder(&self) -> &Path {
         self.folder.as_deref().unwrap_or(Path::new(FOLDER_DEFAULT))
     }
 }
 
-/// True where nobody can be asked.
+/// Returns whether nobody can be asked.
 fn nobody_is_there() -> bool {
     !(stdin().is_terminal() && stderr().is_terminal())
 }
 
-/// An encoding by one of its names.
+/// Returns an encoding by one of its names.
 fn encoding(name: &str) -> Result<&'static Encoding, String> {
     let expected = "expected a name of the WHATWG's, as windows-1251, gbk, shift_jis or ibm866";
     by_name(name).ok_or_else(|| expected.into())
@@ -91,7 +91,7 @@ fn given_column(text: &str) -> Result<GivenColumn, String> {
     Ok(GivenColumn { quantity, column: rest.trim().into(), unit: None, format: None })
 }
 
-/// The arguments with what is asked for: everything that was not said, where not even the folder was.
+/// Returns the arguments with what is asked for: everything that was not said, where not even the folder was.
 ///
 /// # Errors
 ///

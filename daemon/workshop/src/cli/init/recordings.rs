@@ -97,7 +97,7 @@ fn tables(paths: &[PathBuf]) -> Result<Option<Vec<NamedText>>, Failure> {
     paths.iter().map(table).collect::<Result<_, Failure>>().map(Some)
 }
 
-/// A column's numbers, times in s.
+/// Returns a column's numbers, times in s.
 fn numbers_of(path: &Path, name: &str) -> Result<Vec<f64>, String> {
     let mapping = ColumnMapping::of_time(name);
     let read = columns_of(path, &[mapping], &TrainRows::All).map_err(|it| it.to_string())?;
@@ -132,7 +132,7 @@ pub struct OfTrain {
     pub texts: Vec<String>,
 }
 
-/// The rows of the train that is named, or of all where the files hold one.
+/// Returns the rows of the train that is named, or of all where the files hold one.
 ///
 /// # Errors
 ///
@@ -165,7 +165,8 @@ pub fn of_train(files: &[NamedText], named: Option<&str>) -> Result<Option<OfTra
     Ok(Some(OfTrain { rows: TrainRows::Of { column, value: value.into() }, texts }))
 }
 
-/// An error of names that may be read in other letters than they were written in: where their encoding was assumed, it says so.
+/// Returns an error of names that may be read in other letters than they were written in: where their encoding was
+/// assumed, it says so.
 pub fn with_encoding(
     error: DatasetError,
     encoding: &'static Encoding,
@@ -183,7 +184,7 @@ pub fn with_encoding(
     )
 }
 
-/// The paths of existing files from a folder that need not be there yet.
+/// Returns the paths of existing files from a folder that need not be there yet.
 ///
 /// # Errors
 ///

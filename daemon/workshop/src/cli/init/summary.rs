@@ -92,7 +92,7 @@ fn recordings(described: &Described) -> String {
     text + &diagnostics(&described.diagnostics)
 }
 
-/// The commands that come next.
+/// Returns the commands that come next.
 fn next(folder: &Path, described: Option<&Described>) -> String {
     let at = |name: &str| for_shell(&folder.join(name).display().to_string());
     let mut commands = Vec::new();

@@ -1,4 +1,4 @@
-//! `dataset.toml` of a first description, every guess with what speaks for it and what was left, and `daemon.toml`.
+//! `dataset.toml` of a first description, with the reasons for every guess and the unused columns, and `daemon.toml`.
 
 use std::path::Path;
 
@@ -19,14 +19,14 @@ use toml::Value;
 use crate::cli::train_text::comment;
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 
-/// A name for a dataset: its folder's.
+/// Returns a name for a dataset: its folder's.
 pub fn name_of(folder: &Path) -> String {
     let full = std::path::absolute(folder).unwrap_or_else(|_| folder.into());
     let name = full.file_name().map(|name| name.to_string_lossy().into_owned());
     name.filter(|name| !name.is_empty()).unwrap_or_else(|| "recordings".into())
 }
 
-/// The text of `dataset.toml`; `files` are the runs' paths from its folder.
+/// Returns the text of `dataset.toml`; `files` are the runs' paths from its folder.
 pub fn dataset(
     guess: &Guess,
     (name, rows): (&str, Option<&TrainRows>),
@@ -152,7 +152,7 @@ fn column_text(text: &mut TomlText, column: &GuessedColumn) {
     text.column(column.quantity, keys);
 }
 
-/// A text as TOML writes it, on one line.
+/// Returns a text as TOML writes it, on one line.
 fn quoted(text: &str) -> String {
     let mut quoted = String::from("\"");
     for letter in text.chars() {
@@ -190,7 +190,7 @@ const REPLACED: [(&str, &str); 5] = [
     ),
 ];
 
-/// The daemon's configuration: the recommended set for the train beside it.
+/// Returns the daemon's configuration: the recommended set for the train beside it.
 pub fn daemon(has_track: bool) -> String {
     let text = REPLACED
         .iter()

@@ -37,12 +37,12 @@ pub(super) fn letters(position: (HPos, VPos)) -> TextStyle<'static> {
         .pos(Pos::new(position.0, position.1))
 }
 
-/// A stroke of nominal width.
+/// Returns a stroke of nominal width.
 pub(super) fn stroke(colour: RGBColor, width_px: f64) -> ShapeStyle {
     colour.stroke_width((width_px * f64::from(SCALE)).round() as u32)
 }
 
-/// A chart with its axes drawn; the titles stand above the vertical axis and below the
+/// Returns a chart with its axes drawn; the titles stand above the vertical axis and below the
 /// horizontal one.
 pub(super) fn chart<'a, 't>(
     area: &'a Area<'t>,
@@ -90,7 +90,7 @@ pub(super) fn chart<'a, 't>(
     Ok(chart)
 }
 
-/// Where a chart lies.
+/// Returns where a chart lies.
 pub(super) fn frame(chart: &Chart) -> Frame {
     let (across, down) = chart.plotting_area().get_pixel_range();
     let x = chart.x_range();
@@ -107,12 +107,12 @@ fn decimals(axis: &Axis) -> usize {
     (-step.max(1e-9).log10().floor()).clamp(0.0, 6.0) as usize
 }
 
-/// A range that holds all values and zero, with room at the ends.
+/// Returns a range that holds all values and zero, with room at the ends.
 pub(super) fn range_with_zero(values: impl Iterator<Item = f64>) -> [f64; 2] {
     padded(values.chain([0.0]), 0.08)
 }
 
-/// A range that holds all values, widened by a share of it at either end.
+/// Returns a range that holds all values, widened by a share of it at either end.
 pub(super) fn padded(values: impl Iterator<Item = f64>, share: f64) -> [f64; 2] {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for value in values.filter(|value| value.is_finite()) {

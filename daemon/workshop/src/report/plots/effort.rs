@@ -20,7 +20,7 @@ const POINTS: u32 = 100;
 /// A curve of (km/h, kN) with its name and colour.
 type NamedCurve = (&'static str, RGBColor, Vec<(f64, f64)>);
 
-/// The curves as SVG; `None` for a train without any.
+/// Returns the curves as SVG; `None` for a train without any.
 ///
 /// # Errors
 ///
@@ -57,7 +57,7 @@ pub fn draw(train: &TrainModel) -> Result<Option<String>, PlotError> {
     svg.map(Some)
 }
 
-/// The curve from standstill to a speed, as (km/h, kN).
+/// Returns the curve from standstill to a speed, as (km/h, kN).
 fn points(curve: &EffortCurve, top_mps: f64) -> Vec<(f64, f64)> {
     let inside = curve.points().iter().map(|point| point.0).filter(|it| *it > 0.0 && *it < top_mps);
     let speeds = [0.0].into_iter().chain(inside).chain([top_mps]);

@@ -4,7 +4,7 @@
 //!
 //! - [`picture`]: canvas and colours, a figure of the page, a file of its own
 //! - `axes`: axes, titles, text
-//! - [`reading`]: what a pointer reads
+//! - [`reading`]: readings at a pointer
 //! - [`speeds`], [`series`], [`panel`], [`mod@line`], [`effort`]: the plots
 
 mod axes;

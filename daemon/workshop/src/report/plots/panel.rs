@@ -20,7 +20,7 @@ const SIZE: (u32, u32) = (470, 290);
 /// Before and after stand so far apart, as share of the axis.
 const APART: f64 = 0.004;
 
-/// The panel as SVG.
+/// Returns the panel as SVG.
 ///
 /// # Errors
 ///
@@ -65,7 +65,7 @@ pub fn draw(panel: &Panel, has_effect: bool) -> Result<Plot, PlotError> {
     Ok(Plot { svg, readings: vec![reading] })
 }
 
-/// The panel with times of a run from its start where they count from 1970, and what they are then.
+/// Returns the panel with times of a run from its start where they count from 1970, and what they are then.
 fn from_start(panel: &Panel) -> (Panel, Option<String>) {
     let mut panel = panel.clone();
     let first_s = panel.bins.first().map_or(0.0, |bin| bin.at);
@@ -120,7 +120,7 @@ pub(super) fn means(
     Ok(())
 }
 
-/// A range that shows every mean with the usual whisker; the longest whiskers may be cut so that
+/// Returns a range that shows every mean with the usual whisker; the longest whiskers may be cut so that
 /// the others stay readable.
 pub(super) fn vertical_range(bins: &[PanelBin], has_effect: bool) -> [f64; 2] {
     let sides = |bin: &PanelBin| {
@@ -138,7 +138,7 @@ pub(super) fn vertical_range(bins: &[PanelBin], has_effect: bool) -> [f64; 2] {
     range_with_zero(whiskers.chain(bins.iter().map(|bin| bin.effect_n_per_kn.0)))
 }
 
-/// A covariate's name with its unit.
+/// Returns a covariate's name with its unit.
 pub fn axis_title(covariate: Covariate) -> String {
     match (covariate, covariate.unit()) {
         (Covariate::Run, _) => "Fit run, by number".into(),

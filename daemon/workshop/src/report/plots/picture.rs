@@ -110,7 +110,7 @@ impl Width {
     }
 }
 
-/// The style rules that give every colour of the plots its variable.
+/// Returns the style rules that give every colour of the plots its variable.
 pub fn colour_rules() -> String {
     let mut rules = String::new();
     for (RGBColor(r, g, b), variable) in INKS {
@@ -125,8 +125,8 @@ pub fn colour_rules() -> String {
     rules
 }
 
-/// A picture of a nominal size in px for the page: it takes its size from the page, says what it shows, and where
-/// its charts lie; `paint` draws these and gives their frames.
+/// Returns a picture of a nominal size in px for the page: it takes its size from the page, says what it shows, and
+/// where its charts lie; `paint` draws these and gives their frames.
 pub(super) fn picture(
     label: &str,
     class: &str,
@@ -155,7 +155,7 @@ pub(super) fn picture(
     ))
 }
 
-/// A plot for wide pages and one for narrow ones.
+/// Returns a plot for wide pages and one for narrow ones.
 ///
 /// # Errors
 ///
@@ -166,7 +166,7 @@ pub fn wide_and_narrow<T>(
     Ok([draw(Width::Wide)?, draw(Width::Narrow)?])
 }
 
-/// A plot, or one for wide and one for narrow pages, that answers to the pointer; caption and key
+/// Returns a plot, or one for wide and one for narrow pages, that answers to the pointer; caption and key
 /// are HTML.
 pub fn figure(class: &str, caption: &str, key: &str, plots: &[Plot]) -> String {
     let readings = plots.first().map_or(String::new(), |plot| reading::json(&plot.readings));

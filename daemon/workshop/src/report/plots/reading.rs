@@ -36,12 +36,12 @@ pub struct PointerReading {
 }
 
 impl PointerReading {
-    /// A chart without data yet.
+    /// Returns a chart without data yet.
     pub fn new(name: impl Into<String>, unit: &'static str, is_points: bool, at: Vec<f64>) -> Self {
         PointerReading { name: name.into(), unit, is_points, at, series: Vec::new() }
     }
 
-    /// The same with a series more.
+    /// Returns the same with a series more.
     #[must_use]
     pub fn with(
         mut self,
@@ -67,7 +67,7 @@ impl PointerReading {
     }
 }
 
-/// The readings of a plot's charts, for the page's script.
+/// Returns the readings of a plot's charts, for the page's script.
 pub fn json(readings: &[PointerReading]) -> String {
     Value::from(readings.iter().map(PointerReading::json).collect::<Vec<_>>()).to_string()
 }
@@ -81,7 +81,7 @@ fn digits<'v>(values: impl IntoIterator<Item = &'v f64>) -> i32 {
     (-step.log10()).round().clamp(0.0, 9.0) as i32
 }
 
-/// Values as whole numbers, each less the one before: decimals first, null for no number.
+/// Returns the values as whole numbers, each less the one before: decimals first, null for no number.
 fn coded(values: &[f64], digits: i32) -> Value {
     if values.is_empty() {
         return Value::Null;
@@ -95,7 +95,7 @@ fn coded(values: &[f64], digits: i32) -> Value {
     first.chain(steps).map(Value::from).collect::<Vec<_>>().into()
 }
 
-/// A line with the first, least, greatest and last point of every column of a picture.
+/// Returns a line with the first, least, greatest and last point of every column of a picture.
 pub fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     let (Some(first), Some(last)) = (points.first(), points.last()) else { return points };
     if points.len() as f64 <= 4.0 * COLUMNS {

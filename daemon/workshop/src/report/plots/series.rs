@@ -27,7 +27,7 @@ pub struct DailyErrors {
     pub in_force_mps: Option<f64>,
 }
 
-/// The days as SVG; `changes` are the days on which another model came in force, `first` names the
+/// Returns the days as SVG; `changes` are the days on which another model came in force, `first` names the
 /// first day.
 ///
 /// # Errors
@@ -71,7 +71,7 @@ pub fn days(
     Ok(Plot { svg, readings: vec![reading] })
 }
 
-/// A line from day to day, broken where one is missing, with its points.
+/// Returns a line from day to day, broken where one is missing, with its points.
 fn line(
     chart: &mut Chart,
     days: &[DailyErrors],
@@ -130,7 +130,7 @@ pub fn gradient(
     Ok(Plot { svg, readings: vec![reading] })
 }
 
-/// Errors of runs with their numbers in the dataset, as SVG.
+/// Returns the errors of runs with their numbers in the dataset, as SVG.
 ///
 /// # Errors
 ///

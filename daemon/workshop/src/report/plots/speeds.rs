@@ -12,7 +12,7 @@ use super::picture::{
 };
 use super::reading::PointerReading;
 
-/// The run as SVG.
+/// Returns the run as SVG.
 ///
 /// # Errors
 ///
@@ -58,7 +58,7 @@ pub fn draw(trace: &Trace, width: Width, has_effect: bool) -> Result<Plot, PlotE
 /// One of the speeds of a point, its name and its colour.
 type Predicted = (&'static str, RGBColor, fn(&SpeedPoint) -> f64);
 
-/// The predictions that are shown.
+/// Returns the predictions that are shown.
 fn predicted(has_effect: bool) -> impl Iterator<Item = Predicted> {
     let both: [Predicted; 2] = [
         (before_name(has_effect), BEFORE, |point| point.before_mps),
@@ -67,7 +67,7 @@ fn predicted(has_effect: bool) -> impl Iterator<Item = Predicted> {
     both.into_iter().take(1 + usize::from(has_effect))
 }
 
-/// The run with its times from its start where they count from 1970, and what they are.
+/// Returns the run with its times from its start where they count from 1970, and what they are.
 fn from_start(trace: &Trace) -> (Trace, String) {
     let mut trace = trace.clone();
     let first_s = trace.pieces.iter().flatten().map(|point| point.time_s).reduce(f64::min);

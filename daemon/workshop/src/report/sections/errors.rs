@@ -15,7 +15,7 @@ use crate::report::html::{
 };
 use crate::report::plots::{PlotError, figure, series, speeds, wide_and_narrow};
 
-/// The section.
+/// Returns the section.
 ///
 /// # Errors
 ///
@@ -81,7 +81,7 @@ fn summary(subject: &Subject) -> String {
     marked_table(caption, shown, &rows, |row| row.2) + &format!("<p class=\"note\">{note}</p>\n")
 }
 
-/// The rows of the errors from stop to stop: the one that judges, and the middle one.
+/// Returns the rows of the errors from stop to stop: the one that judges, and the middle one.
 fn stop_to_stop(name: &str, found: &StopToStop) -> [SummaryRow; 2] {
     let row =
         |what: &str, mps: [f64; 2], intervals: Option<[[f64; 2]; 2]>, taken: IntervalEstimate| {
@@ -101,7 +101,7 @@ fn stop_to_stop(name: &str, found: &StopToStop) -> [SummaryRow; 2] {
     [(all, cells, name == "Holdout"), (middle, of_middle, false)]
 }
 
-/// How the intervals were found.
+/// Returns how the intervals were found.
 fn intervals(holdout: Option<ErrorPair>, fit: Option<ErrorPair>) -> String {
     let words = |pair: ErrorPair, name: &str| match pair.resampling {
         Resampling::Runs(2) => format!(

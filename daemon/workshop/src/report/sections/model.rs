@@ -12,7 +12,7 @@ use crate::report::Subject;
 use crate::report::html::ColumnAlignment::{Numbers, Words};
 use crate::report::html::{self, TableColumn, escape, estimate, marked_table, minus};
 
-/// The section.
+/// Returns the section.
 pub fn parameters(subject: &Subject) -> PageSection {
     let has_effect = subject.has_effect();
     let name = |row: &ParameterRow| {
@@ -45,7 +45,7 @@ pub fn parameters(subject: &Subject) -> PageSection {
     PageSection { id: "parameters", title: "Parameters", body }
 }
 
-/// True for a, b and c.
+/// Returns true for a, b and c.
 fn is_base(row: &ParameterRow) -> bool {
     row.before.is_some()
 }
@@ -55,7 +55,7 @@ const SURE: f64 = 0.99;
 /// Runs that are named one by one at most.
 const NAMED_MAX: usize = 8;
 
-/// The table with its notes; empty where no place was estimated.
+/// Returns the table with its notes; empty where no place was estimated.
 fn places(subject: &Subject) -> String {
     let places = &subject.data.places;
     if places.is_empty() {
@@ -110,7 +110,7 @@ fn sentence(place: &PlaceRuns) -> String {
     format!("Among the fit runs, {group} {} (more than 99 % counts as sure).", parts.join("; "))
 }
 
-/// The section.
+/// Returns the section.
 pub fn candidates(subject: &Subject) -> PageSection {
     let rows = &subject.data.candidates;
     let has_beside = rows.iter().any(|row| row.beside.is_some());

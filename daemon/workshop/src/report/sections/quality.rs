@@ -12,7 +12,7 @@ use crate::report::html::{TableColumn, count, details, escape, grouped, table};
 use crate::report::provenance::{FileDigest, Provenance};
 use crate::run_facts::{self, mass_t, recorded, recorded_in_words};
 
-/// The section.
+/// Returns the section.
 pub fn section(subject: &Subject) -> PageSection {
     let explanation = subject.explanation;
     let used: Vec<UsedRun> = subject
@@ -161,7 +161,7 @@ fn diagnostics(subject: &Subject) -> String {
     html + "</ul>\n"
 }
 
-/// The section.
+/// Returns the section.
 pub fn reproduce(provenance: &Provenance) -> PageSection {
     let mut body = format!(
         "<p>The same dataset and version give the same numbers: nothing is drawn at random without \

@@ -7,7 +7,7 @@ use crate::report::Subject;
 use crate::report::html::{escape, legend};
 use crate::report::plots::{PlotError, figure, line, panel, wide_and_narrow};
 
-/// The section.
+/// Returns the section.
 ///
 /// # Errors
 ///
@@ -54,7 +54,7 @@ pub fn section(subject: &Subject) -> Result<PageSection, PlotError> {
     Ok(PageSection { id: "residual", title: "The residual force", body })
 }
 
-/// The section; none where no line is declared and no position known.
+/// Returns the section; none where no line is declared and no position known.
 ///
 /// # Errors
 ///

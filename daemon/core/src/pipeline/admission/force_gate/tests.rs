@@ -7,7 +7,7 @@ const STEP_S: f64 = 0.2;
 /// N of one N/kN on the train.
 const UNIT_N: f64 = 981.0;
 
-/// A sample of a train of 100 t on the level, at 20 m/s.
+/// Returns a sample of a train of 100 t on the level, at 20 m/s.
 fn sample(index: usize, force_n_per_kn: f64) -> ResolvedSample {
     ResolvedSample {
         time_ns: index as i64 * 200_000_000,

@@ -8,7 +8,7 @@ fn validator() -> Validator {
     Validator::new(TRAIN, 100_000.0)
 }
 
-/// A train at a steady 20 m/s, five samples a second.
+/// Returns a train at a steady 20 m/s, five samples a second.
 fn cruising(index: u64) -> TrainSample {
     let mut sample = TrainSample::empty(TRAIN)
         .with(SampleField::Speed, 20.0)

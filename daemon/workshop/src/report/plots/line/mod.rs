@@ -1,5 +1,5 @@
-//! A line over its chainage: what is declared of it (height, gradient, curves, permitted speed, with
-//! tunnels and stops), and below it what was found.
+//! A line over its chainage: its declared properties (height, gradient, curves, permitted speed, with tunnels and
+//! stops), and below them the effects found.
 
 mod panels;
 
@@ -30,7 +30,7 @@ struct Ground<'a> {
     x: [f64; 2],
 }
 
-/// The line as a plot; `None` where nothing of it is known that could be drawn.
+/// Returns the line as a plot; `None` where nothing of it is known that could be drawn.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! The properties of a line, declared and found: their data, their range, what a pointer reads of them.
+//! The properties of a line, declared and found: their data, their range, their readings at a pointer.
 
 use dynocar_analysis::explain::report::panels::PanelBin;
 use dynocar_analysis::explain::report::residual_line::{AlongLine, MarkedInterval};
@@ -102,12 +102,12 @@ impl Panel {
     }
 }
 
-/// A direction of travel, in words.
+/// Returns a direction of travel, in words.
 pub(super) fn direction_label(direction: f64) -> &'static str {
     if direction > 0.0 { "growing chainage" } else { "falling chainage" }
 }
 
-/// The rows of a panel of places: what holds in all runs, or one row for each run.
+/// Returns the rows of a panel of places: what holds in all runs, or one row for each run.
 pub(super) fn rows(sections: &[MarkedInterval]) -> Vec<Option<&str>> {
     let mut rows: Vec<Option<&str>> = sections.iter().map(|it| it.run.as_deref()).collect();
     rows.sort_unstable();
@@ -115,7 +115,7 @@ pub(super) fn rows(sections: &[MarkedInterval]) -> Vec<Option<&str>> {
     rows
 }
 
-/// The sections in words.
+/// Returns the sections in words.
 pub(super) fn described(sections: &[MarkedInterval]) -> String {
     let one = |it: &MarkedInterval| {
         let run = it.run.as_ref().map_or(String::new(), |run| format!(" in {run}"));
@@ -127,7 +127,7 @@ pub(super) fn described(sections: &[MarkedInterval]) -> String {
 /// Curves so near in m to each other follow without straight track between them.
 const JOINED_M: f64 = 0.1;
 
-/// The first and the last chainage in m that something is known of.
+/// Returns the first and the last chainage in m that something is known of.
 pub(super) fn ends_m(track: &Track) -> Option<[f64; 2]> {
     let survey = &track.survey;
     let starts = |profile: Option<&StepProfile>| -> Vec<f64> {
@@ -204,7 +204,7 @@ pub(super) fn curvature(track: &Track, ends_m: [f64; 2]) -> Vec<(f64, f64)> {
     points
 }
 
-/// The panels below those of the declared line.
+/// Returns the panels below those of the declared line.
 pub(super) fn found(found: &AlongLine) -> Vec<Panel> {
     let mut panels = Vec::new();
     let mut push = |name: String, unit: &'static str, content: Content| {
