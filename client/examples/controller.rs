@@ -4,7 +4,7 @@
 //! `cargo run --release -p dynocar-client --example controller -- [train id] [seconds]`
 //! reports on standard output whenever its resistance comes from another source. Ten seconds of coasting
 //! teach the daemon next to nothing: let `dynocar replay config/demo --rate 200` drive train 1 first,
-//! and this one drives on with what was learned.
+//! and this one drives on with the learned values.
 
 use std::time::{Duration, Instant};
 

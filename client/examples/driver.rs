@@ -74,7 +74,7 @@ impl Train {
     }
 }
 
-/// Your controller: the force in N, braking negative, at a place with a speed, by what is known.
+/// Your controller: the force in N, braking negative, at a place with a speed, by known parameters.
 fn controller_n(train: &Train, coast_from_m: f64, known: &Parameters) -> f64 {
     let curve_mps = (2.0 * BRAKING_MPS2 * (LEG_M - train.at_m).max(0.0)).sqrt();
     let speed_mps = train.speed_mps;
@@ -91,7 +91,7 @@ fn controller_n(train: &Train, coast_from_m: f64, known: &Parameters) -> f64 {
     known.force_n(acceleration_mps2, speed_mps).clamp(-BRAKE_N, TRACTION_N)
 }
 
-/// Running time in s by what is known.
+/// Running time in s by known parameters.
 fn predicted_s(coast_from_m: f64, known: &Parameters) -> f64 {
     let (mut train, mut time_s) = (Train::default(), 0.0);
     while time_s < 2.0 * DUE_S && (train.at_m < 1.0 || train.speed_mps > 0.0) {
@@ -101,7 +101,7 @@ fn predicted_s(coast_from_m: f64, known: &Parameters) -> f64 {
     time_s
 }
 
-/// Returns the first place in m from which coasting still keeps the timetable, by what is known.
+/// Returns the first place in m from which coasting still keeps the timetable, by known parameters.
 fn coasting_place_m(known: &Parameters) -> f64 {
     let (mut early_m, mut late_m) = (0.1 * LEG_M, LEG_M);
     for _ in 0..20 {

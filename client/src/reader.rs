@@ -105,7 +105,7 @@ impl Reading<'_> {
             }
     }
 
-    /// Returns the state of use of what was asked for, in one word.
+    /// Returns the state of use of the request, in one word.
     pub fn use_state(&self) -> UseState {
         UseState::of(self.status(), self.is_usable())
     }

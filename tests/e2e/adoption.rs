@@ -73,18 +73,18 @@ impl Cast {
         daemon
     }
 
-    /// Puts a model into the store that grew from what is declared, with another a.
+    /// Puts a model into the store that grew from the declaration, with another a.
     fn put(&self, declared: &str, a: &str) -> ModelHash {
         let text = |train: String| ModelText { train, track: Some(self.track.clone()) };
         let parent = Some(text(self.train.clone()).hash());
-        let origin = Origin::written("Another a.", parent, UtcSecond::of(SystemTime::now()));
+        let origin = Origin::written("Another a.", parent, UtcSecond::from_time(SystemTime::now()));
         let text = text(self.train.replace(declared, a));
         let new = NewModel { text, origin, answer_json: None, report_html: None };
         self.models().put(&new).expect("a model is put")
     }
 
     fn decide(&self, what: ModelChoice) {
-        let at = UtcSecond::of(SystemTime::now());
+        let at = UtcSecond::from_time(SystemTime::now());
         let new = NewDecision { what, by: "test".into(), reason: String::new(), at };
         self.models().decide(&new).expect("a decision");
     }
@@ -161,7 +161,7 @@ fn an_adopted_model_goes_to_work_at_standstill_without_a_lost_sample_and_so_does
     stop(daemon);
 }
 
-/// Drives until a rule has decided between what is declared and another model.
+/// Drives until a rule has decided between the declaration and another model.
 fn decided_by_rule(declared: &str, rival: &str, adopted_by_hand: bool) {
     let cast = Cast::new(declared);
     let daemon = cast.daemon("adopt = \"when_better\"\ntrips_between_mistakes = 20");

@@ -1,4 +1,4 @@
-//! Every term that can be declared, before every estimator: what is declared and true moves none.
+//! Every term that can be declared, before every estimator: a declaration that is true moves none.
 
 #[path = "declared/drive.rs"]
 mod drive;

@@ -34,7 +34,7 @@ fn assert_free_of(package: &str, forbidden: &[&str]) {
     }
 }
 
-/// The packages without channel, clock, file, thread and log: what is declared, what runs live, the methods
+/// The packages without channel, clock, file, thread and log: the declaration, what runs live, the methods
 /// of the papers, what reads recorded runs, and what explains them. The last says what may be computed side
 /// by side (rayon), and those who call it on which threads (decision 0018).
 const PURE: [&str; 5] =

@@ -32,7 +32,7 @@ struct Workplace {
 
 impl Workplace {
     /// No run lies there yet.
-    fn of(kinds: &[EffectKind]) -> Self {
+    fn from_kinds(kinds: &[EffectKind]) -> Self {
         let site = DaemonSite::new();
         let simulated =
             simulate(&SimulatorSettings::new(SEED, EffectRequest::Kinds(kinds.to_vec())));
@@ -134,7 +134,7 @@ fn learned(models: &TrainModels) -> Vec<dynocar::models::Stored> {
 
 #[test]
 fn an_undeclared_tunnel_becomes_a_candidate_once_and_is_adopted_and_taken_back_by_name() {
-    let work = Workplace::of(&[EffectKind::TunnelDrag]);
+    let work = Workplace::from_kinds(&[EffectKind::TunnelDrag]);
     assert!(work.learn(&[]).contains("too few runs"));
     work.record("first", 0..7);
     let said = work.learn(&[]);
@@ -181,7 +181,7 @@ fn an_undeclared_tunnel_becomes_a_candidate_once_and_is_adopted_and_taken_back_b
 
 #[test]
 fn a_dragging_brake_is_an_event_with_its_runs_and_no_model() {
-    let work = Workplace::of(&[EffectKind::DraggingBrake]);
+    let work = Workplace::from_kinds(&[EffectKind::DraggingBrake]);
     work.record("runs", 0..8);
     let said = work.learn(&[]);
     assert!(said.contains("new maintenance events: 1"), "{said}");
@@ -190,7 +190,10 @@ fn a_dragging_brake_is_an_event_with_its_runs_and_no_model() {
     let events = models.events().unwrap();
     let [(1, event)] = &events[..] else { panic!("one event: {events:?}") };
     assert_eq!(event.kind, "dragging_brake");
-    assert!(event.sentence.starts_with("dragging brake in ") && event.sentence.contains(" ± "));
+    assert!(
+        event.sentence.starts_with("a dragging brake in ")
+            && event.sentence.contains(" (95 % interval ")
+    );
     assert!(
         event.windows.iter().all(|it| it.run.starts_with("runs/") && it.t_end_s > it.t_start_s)
     );
@@ -203,7 +206,7 @@ fn a_dragging_brake_is_an_event_with_its_runs_and_no_model() {
 
 #[test]
 fn where_nothing_acts_nothing_is_put_into_the_store() {
-    let work = Workplace::of(&[]);
+    let work = Workplace::from_kinds(&[]);
     work.record("runs", 0..8);
     let said = work.learn(&[]);
     let models = work.models();
@@ -212,7 +215,7 @@ fn where_nothing_acts_nothing_is_put_into_the_store() {
 
 #[test]
 fn a_learner_killed_at_any_moment_leaves_nothing_half_done_and_the_next_one_goes_on() {
-    let work = Workplace::of(&[EffectKind::TunnelDrag]);
+    let work = Workplace::from_kinds(&[EffectKind::TunnelDrag]);
     work.record("runs", 0..8);
     let models = work.models();
     for delay_ms in [0, 100, 400, 1200, 2500, 4000] {
@@ -236,7 +239,7 @@ fn a_learner_killed_at_any_moment_leaves_nothing_half_done_and_the_next_one_goes
 
 #[test]
 fn a_new_suspicion_starts_a_round_and_a_signal_ends_the_learner() {
-    let work = Workplace::of(&[EffectKind::TunnelDrag]);
+    let work = Workplace::from_kinds(&[EffectKind::TunnelDrag]);
     let host = work.site.host();
     let _role = RoleLock::claim(&host, TRAIN, Role::Daemon).unwrap();
     let transport = Transport::open(&host, "played-daemon").unwrap();
@@ -272,9 +275,9 @@ fn a_new_suspicion_starts_a_round_and_a_signal_ends_the_learner() {
 #[test]
 fn the_time_of_the_day_comes_for_a_learner_whose_clock_is_set_forth_and_back() {
     const DAY_S: u64 = 86_400;
-    let work = Workplace::of(&[]);
+    let work = Workplace::from_kinds(&[]);
     let strange = StrangeHost::new(work.site.path(), work.site.path());
-    let now_s = UtcSecond::of(SystemTime::now()).unix_s;
+    let now_s = UtcSecond::from_time(SystemTime::now()).unix_s;
     // In 5 to 6 hours.
     let at_s = now_s / 3600 * 3600 + 6 * 3600;
     let at = format!("{:02}:00", at_s / 3600 % 24);
@@ -303,7 +306,7 @@ fn the_time_of_the_day_comes_for_a_learner_whose_clock_is_set_forth_and_back() {
 
 #[test]
 fn a_signal_ends_a_learner_in_the_middle_of_an_explanation_and_nothing_is_concluded() {
-    let work = Workplace::of(&[EffectKind::TunnelDrag]);
+    let work = Workplace::from_kinds(&[EffectKind::TunnelDrag]);
     work.record("runs", 0..8);
     let mut learner = work.start(&["--once"]);
     // The runs are known: they are being read and explained.
@@ -319,7 +322,7 @@ fn a_signal_ends_a_learner_in_the_middle_of_an_explanation_and_nothing_is_conclu
 
 #[test]
 fn a_store_has_one_learner() {
-    let work = Workplace::of(&[]);
+    let work = Workplace::from_kinds(&[]);
     let settings = || LearnerSettings {
         store: Store::at(&work.path("models")),
         runs: work.path("runs"),
@@ -339,7 +342,7 @@ fn a_store_has_one_learner() {
 
 #[test]
 fn runs_and_names_that_cannot_be_are_refused_or_left_out_in_words() {
-    let work = Workplace::of(&[]);
+    let work = Workplace::from_kinds(&[]);
     let refused = |words: &[&str]| {
         let output = work.learn_once(words);
         assert_eq!(output.status.code(), Some(2), "{words:?}");

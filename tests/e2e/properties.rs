@@ -95,7 +95,7 @@ proptest! {
         (it.values, it.parameters, it.parameter_count) = (values, parameters, count);
         it.covariance.copy_from_slice(&covariance);
         [it.innovation_mean_square, it.innovation_correlation] = statistics;
-        if let Ok(kept) = KeptEstimate::of(&it) {
+        if let Ok(kept) = KeptEstimate::from_snapshot(&it) {
             prop_assert!(kept.values().iter().all(|it| it.is_finite()));
             if elapsed_s.is_finite() && kept.values().iter().all(|it| it.abs() < 1e100) {
                 let aged = kept.after(elapsed_s);

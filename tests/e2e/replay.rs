@@ -1,4 +1,4 @@
-//! `dynocar replay` says what became of its own samples, and fails where nobody used them.
+//! `dynocar replay` reports the fate of its own samples, and fails where nobody used them.
 
 use std::path::Path;
 

@@ -201,7 +201,8 @@ fn a_warm_start_is_sooner_estimated_and_no_less_right_than_a_cold_one() {
     ];
     for kind in kinds {
         let (cold_first, cold) = feed(&mut pipeline(&dataset, kind), &samples);
-        let kept = KeptEstimate::of(&cold).unwrap_or_else(|error| panic!("{kind}: {error}"));
+        let kept =
+            KeptEstimate::from_snapshot(&cold).unwrap_or_else(|error| panic!("{kind}: {error}"));
         let kept = kept.after(3600.0);
         let mut warm = pipeline(&dataset, kind);
         assert!(warm.warm_start(&kept), "{kind}");
@@ -311,7 +312,7 @@ fn a_tram_goes_on_with_what_was_in_use_from_the_first_sample_after_a_restart_at_
     for (index, sample) in samples.iter().enumerate() {
         let before = *first.process(sample);
         if index % rate == 0
-            && let Ok(now) = KeptEstimate::of(&before)
+            && let Ok(now) = KeptEstimate::from_snapshot(&before)
             && !kept.as_ref().is_some_and(|it| it.has_values_of(&now))
         {
             kept = Some(now);

@@ -16,10 +16,10 @@ fn steps_lie_below_the_true_curve_and_are_hardly_more_cautious_than_the_best() {
         let curves: Vec<DecelerationCurve> = (0..15)
             .map(|_| {
                 let factor = 1.0 + 0.03 * normal(&mut random);
-                DecelerationCurve::of(&stop(factor, 30.0, &mut random).0).unwrap()
+                DecelerationCurve::from_samples(&stop(factor, 30.0, &mut random).0).unwrap()
             })
             .collect();
-        let law = DecelerationLaw::of(&curves, 0.03).unwrap();
+        let law = DecelerationLaw::new(&curves, 0.03).unwrap();
         let steps = SpeedSteps::below(&lower_bound(&law, 0.95)).unwrap();
         let fastest = law.fastest_mps();
         let speeds = (4..).map(|k| 0.25 * f64::from(k)).take_while(|it| *it <= fastest);

@@ -142,6 +142,6 @@ fn loads_by_stop_stay_right_where_runs_that_are_not_searched_go_on_to_further_st
     };
     let errors: Vec<f64> = found.as_array().unwrap().iter().filter_map(error).collect();
     let mean = errors.iter().sum::<f64>() / errors.len() as f64;
-    // Six runs go one stop further, to another load; taken for what is declared, it raises all by 0.04.
+    // Six runs go one stop further, to another load; taken for the declaration, it raises all by 0.04.
     assert!(errors.len() > 8 && mean.abs() < 0.015, "{mean}: {errors:?}");
 }

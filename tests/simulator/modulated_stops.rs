@@ -126,7 +126,7 @@ fn study(recording: &str, columns: &str) -> Study {
     let files = [("dataset.toml", &manifest[..]), ("train.toml", TRAIN), ("run.csv", recording)];
     let dataset = Dataset::load(&files[..]).expect("a dataset");
     let settings = StudySettings { find: FindSettings::default(), repeatability: 0.03 };
-    Study::of(&dataset, &settings, &[])
+    Study::new(&dataset, &settings, &[])
 }
 
 /// Every stop is found, as what it was, with its time and distance; how many decelerations lie in

@@ -169,7 +169,7 @@ fn study(recording: &str) -> (Dataset, Study) {
     let files = [("dataset.toml", manifest), ("train.toml", TRAIN), ("run.csv", recording)];
     let dataset = Dataset::load(&files[..]).expect("a dataset");
     let settings = StudySettings { find: FindSettings::default(), repeatability: 0.03 };
-    let study = Study::of(&dataset, &settings, &[]);
+    let study = Study::new(&dataset, &settings, &[]);
     (dataset, study)
 }
 

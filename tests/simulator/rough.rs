@@ -116,7 +116,7 @@ fn a_tunnel_that_the_map_lacks_is_named_though_a_form_between_two_places_looks_l
 
 #[test]
 fn what_does_not_stand_beside_the_usual_errors_is_not_called_nothing() {
-    // A force that grows in the cold, which an outside temperature explains up to the bound of what is looked for.
+    // A force that grows in the cold, which an outside temperature explains up to the bound of the quantity looked for.
     let (_, answer) = explained_with(EffectRequest::AnyLaw, 2_500_004);
     assert_eq!(answer.verdict, Verdict::Unknown, "{}", answer.statement);
 }

@@ -46,7 +46,8 @@ fn the_law_of_one_stop_holds_the_true_one_and_the_next_stop_keeps_its_bound() {
         let mut random = StdRng::seed_from_u64(seed);
         let factors = [1.0 + 0.03 * normal(&mut random), 1.0 + 0.03 * normal(&mut random)];
         let (samples, _) = stop(factors[0], 30.0, &mut random);
-        let law = DecelerationLaw::of(&[DecelerationCurve::of(&samples).unwrap()], 0.03).unwrap();
+        let law = DecelerationLaw::new(&[DecelerationCurve::from_samples(&samples).unwrap()], 0.03)
+            .unwrap();
         for point in law.points.iter().filter(|it| (2.0..27.0).contains(&it.speed_mps)) {
             let truth = factors[0] * true_mps2(point.speed_mps);
             let off = (point.deceleration_mps2 - truth).abs();
@@ -73,10 +74,10 @@ fn many_stops_show_their_own_repeatability_and_slower_ones_say_nothing_of_faster
         .map(|k| {
             let factor = 1.0 + 0.08 * normal(&mut random);
             let from_mps = if k % 2 == 0 { 28.0 } else { 14.0 };
-            DecelerationCurve::of(&stop(factor, from_mps, &mut random).0).unwrap()
+            DecelerationCurve::from_samples(&stop(factor, from_mps, &mut random).0).unwrap()
         })
         .collect();
-    let law = DecelerationLaw::of(&curves, 0.03).unwrap();
+    let law = DecelerationLaw::new(&curves, 0.03).unwrap();
     assert!((0.05..0.11).contains(&law.repeatability), "{}", law.repeatability);
     assert!((law.response.lost_s() - 1.0).abs() < 0.3, "{:?}", law.response);
     assert_eq!((law.points[4].stops, law.points[19].stops), (30, 15));

@@ -29,7 +29,7 @@ pub enum Target {
     Dataset,
     /// A run's table.
     Csv,
-    /// A logger's file: its letters, a guess of what it holds, and its table as declared.
+    /// A logger's file: its letters, a guess of its contents, and its table as declared.
     Logger,
     /// A train file.
     Train,

@@ -21,7 +21,7 @@ pub struct BrakingCurve {
 impl BrakingCurve {
     /// Returns the curve of a train that brakes from a speed in m/s: the ordinary one, or a weaker one where
     /// brake or rail are known to carry less.
-    pub fn of(knowledge: &Knowledge, ability: &Ability, from_mps: f64) -> Self {
+    pub fn new(knowledge: &Knowledge, ability: &Ability, from_mps: f64) -> Self {
         let possible = PLANNED_SHARE * knowledge.braking_max_mps2(ability, from_mps);
         BrakingCurve::with(ability.braking_mps2.min(possible).max(0.05))
     }
@@ -89,7 +89,7 @@ mod tests {
     #[test]
     fn distance_and_time_are_the_integrals_of_the_deceleration_and_speed_is_their_inverse() {
         let (knowledge, ability) = metro();
-        let curve = BrakingCurve::of(&knowledge, &ability, 20.0);
+        let curve = BrakingCurve::new(&knowledge, &ability, 20.0);
         for from_mps in [0.5, 2.9, 3.0, 17.0] {
             let (mut speed, mut distance_m, mut time_s) = (from_mps, 0.0, 0.0);
             let step_s = 1e-4;
@@ -107,9 +107,9 @@ mod tests {
     #[test]
     fn a_brake_that_is_known_to_be_weak_is_asked_for_less() {
         let (mut knowledge, ability) = metro();
-        let ordinary = BrakingCurve::of(&knowledge, &ability, 20.0);
+        let ordinary = BrakingCurve::new(&knowledge, &ability, 20.0);
         knowledge.brake_scale.value = 0.5;
-        let weak = BrakingCurve::of(&knowledge, &ability, 20.0);
+        let weak = BrakingCurve::new(&knowledge, &ability, 20.0);
         assert!(weak.distance_m(20.0) > 1.5 * ordinary.distance_m(20.0));
     }
 }

@@ -161,7 +161,7 @@ fn gear(brake_max_n: f64) -> BrakeGear {
 
 /// Brake gear as the daemon assumes it.
 pub fn declared_gear(gear: &BrakeGear) -> DeclaredGear {
-    DeclaredGear::of(gear).expect("a gear with every quantity")
+    DeclaredGear::from_gear(gear).expect("a gear with every quantity")
 }
 
 /// Forces that act on the train and stand in no file.

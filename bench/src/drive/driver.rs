@@ -74,7 +74,7 @@ impl LegDriver {
     pub fn new(leg: PlannedLeg, ability: Ability, cycle_s: f64, knowledge: Knowledge) -> Self {
         let planner = Planner { leg: &leg, knowledge: &knowledge, ability: &ability };
         let plan = planner.plan((0.0, 0.0), leg.due_s);
-        let curve = BrakingCurve::of(&knowledge, &ability, 0.0);
+        let curve = BrakingCurve::new(&knowledge, &ability, 0.0);
         LegDriver {
             leg,
             ability,
@@ -185,7 +185,7 @@ impl LegDriver {
 
     fn decide(&mut self) {
         let (at_m, speed_mps) = self.ahead();
-        let curve = BrakingCurve::of(&self.knowledge, &self.ability, speed_mps);
+        let curve = BrakingCurve::new(&self.knowledge, &self.ability, speed_mps);
         if self.phase == Phase::Braking {
             self.curve = self.curve.no_steeper_than(curve);
             return;

@@ -115,7 +115,7 @@ impl Journey {
         self.running_s
     }
 
-    /// One cycle by what is known.
+    /// One cycle by known parameters.
     ///
     /// The driver drives by `knowledge`; `sure` is what bounds a stop.
     pub fn proceed(&mut self, sample: &TrainSample, knowledge: &Knowledge, sure: &Knowledge) {

@@ -246,7 +246,7 @@ impl AnswerMemory {
     }
 }
 
-/// Takes in a cycle of the moving train: what is declared and what was learned, in the order of [`ASKED`]; brake and
+/// Takes in a cycle of the moving train: the declaration and the learned values, in the order of [`ASKED`]; brake and
 /// adhesion count while the train brakes.
 pub fn count(
     scores: &mut [QuantityScore; 4],

@@ -148,7 +148,7 @@ impl Planner<'_> {
         cruise_mps: f64,
         coast_from_m: f64,
     ) -> DrivePlan {
-        let curve = BrakingCurve::of(self.knowledge, self.ability, cruise_mps.max(speed_mps));
+        let curve = BrakingCurve::new(self.knowledge, self.ability, cruise_mps.max(speed_mps));
         let step_m = (self.leg.length_m - at_m).max(1.0) / STEPS as f64;
         let (mut time_s, mut energy_j) = (0.0, 0.0);
         // Beyond all need: a step is a share of the leg.
@@ -226,7 +226,7 @@ mod tests {
     fn a_reckoned_run_is_that_of_small_steps_in_time() {
         let (knowledge, ability) = metro();
         let found = with(&knowledge, &ability, |it| it.run((0.0, 0.0), 17.0, 600.0));
-        let curve = BrakingCurve::of(&knowledge, &ability, 17.0);
+        let curve = BrakingCurve::new(&knowledge, &ability, 17.0);
         let (leg, step_s) = (leg(), 1e-3);
         let (mut at_m, mut speed, mut time_s, mut energy_j) = (0.0, 0.0_f64, 0.0, 0.0);
         while curve.distance_m(speed) < leg.length_m - at_m {

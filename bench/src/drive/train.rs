@@ -206,7 +206,7 @@ impl Train {
         let cycle_s = self.service.cycle_s();
         let steps = (cycle_s / STEP_MAX_S).ceil();
         let step_s = cycle_s / steps;
-        // The reported force follows the command; what is left of the lag is the mean delay.
+        // The reported force follows the command; the rest of the lag is the mean delay.
         let follow = 1.0 - (-step_s / (self.ability.lag_s - MEAN_DELAY_S)).exp();
         let late = (self.world.delay_s / step_s).round() as usize;
         let mut acceleration = 0.0;

@@ -61,7 +61,7 @@ impl DemoRun {
     /// Returns the motion at every sample that has one.
     fn motions(&self) -> Vec<KnownMotion> {
         let mut resolve = resolving(DATASET_TRAIN, &self.train, self.track.clone());
-        let motion = |sample| KnownMotion::of(&resolve(sample)?).ok();
+        let motion = |sample| KnownMotion::from_sample(&resolve(sample)?).ok();
         self.samples.iter().filter_map(motion).collect()
     }
 }
@@ -94,8 +94,10 @@ const STEP_S: f64 = 0.2;
 /// Eight behaviours of a bias side by side.
 fn mass_filter(run: &DemoRun) -> EstimatorCase {
     let train = &run.train;
-    let dynamics =
-        Dynamics { resistance: LineResistance::declared(train), inertia: Inertia::of(train) };
+    let dynamics = Dynamics {
+        resistance: LineResistance::declared(train),
+        inertia: Inertia::from_train(train),
+    };
     let motions = run.motions();
     EstimatorCase::new("mass Kalman step, 8 behaviours", motions.len() - 1, move || {
         let models = MassKalmanSettings::default().bias_models();

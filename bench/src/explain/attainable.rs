@@ -58,7 +58,7 @@ impl TrueLaw {
 
 impl Hypothesis for TrueLaw {
     fn nature(&self) -> Nature<'_> {
-        Nature::of(EffectKind::Unknown, &self.parameters)
+        Nature::new(EffectKind::Unknown, &self.parameters)
     }
 
     fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {

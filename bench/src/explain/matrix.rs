@@ -18,7 +18,7 @@ const NEAR: f64 = 1.1;
 const SHARES: [f64; 7] = [0.5, 0.8, 0.9, 0.95, 0.98, 0.99, 1.0];
 
 /// Returns the results of every scenario, for machines and for people.
-pub fn of(grades: &[(ExplainScenario, Vec<Grade>)]) -> (Value, String) {
+pub fn summary(grades: &[(ExplainScenario, Vec<Grade>)]) -> (Value, String) {
     let kinds: Vec<Record> = grades.iter().map(|(kind, own)| record(kind.name(), own)).collect();
     let all = || grades.iter().flat_map(|(_, grades)| grades);
     let nulls = || grades.iter().filter(|(kind, _)| kind.is_null()).flat_map(|(_, own)| own);

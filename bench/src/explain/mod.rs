@@ -70,7 +70,7 @@ impl ExplainBenchArguments {
             }
             graded
         });
-        let (all, words) = matrix::of(&grades);
+        let (all, words) = matrix::summary(&grades);
         family.output.give(&all, || words)
     }
 }

@@ -98,7 +98,7 @@ fn gradient_errors(
 /// Returns the disturbances of a run of a dataset.
 fn disturbances(simulated: &SimulatedDataset, plan: &RunPlan) -> Disturbances {
     let SimulatedDataset { effects, train, line, settings, .. } = simulated;
-    Disturbances::of(effects, train, line, plan, settings)
+    Disturbances::new(effects, train, line, plan, settings)
 }
 
 /// Returns the mean wind in m/s towards direction -1 that blew in the runs whose winds the answer gives, else in all of

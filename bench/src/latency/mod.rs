@@ -79,7 +79,7 @@ impl LatencyArguments {
         if let Some(file) = &self.plot {
             report::draw(&measured, file)?;
         }
-        let (all, text) = report::of(&measured);
+        let (all, text) = report::summary(&measured);
         self.output.give(&all, || text)
     }
 

@@ -43,7 +43,7 @@ pub fn pooled(
 }
 
 /// Returns the measured latencies, for machines and for people.
-pub fn of(measured: &MeasuredCase) -> (Value, String) {
+pub fn summary(measured: &MeasuredCase) -> (Value, String) {
     let MeasuredCase { cases, costs, at_rest, extent } = measured;
     let (rate_hz, cores) = (extent.traffic.rate_hz, extent.cores);
     let records: Vec<Record> = cases.iter().map(|case| record(case, cases)).collect();

@@ -81,7 +81,7 @@ impl LoadArguments {
     /// loss.
     pub fn run(&self) -> Result<(), BenchError> {
         let load = self.load()?;
-        let (mut all, mut text) = plan::of(&load, &load.run()?);
+        let (mut all, mut text) = plan::result(&load, &load.run()?);
         let seconds = load.extent.seconds.min(TRIAL_SECONDS);
         let short = Load { extent: Extent { seconds, ..load.extent }, ..load };
         if self.search && !is_due() {

@@ -38,7 +38,7 @@ impl Load {
 const MEBIBYTE: f64 = 1024.0 * 1024.0;
 
 /// Returns a trial, for machines and for people.
-pub fn of(load: &Load, trial: &OpenLoopTrial) -> (Value, String) {
+pub fn result(load: &Load, trial: &OpenLoopTrial) -> (Value, String) {
     let of = |since| load.pipelines.iter().zip(&trial.pipelines).map(move |it| pipeline(it, since));
     let records: Vec<Record> = of("appointed").chain(of("leaving")).collect();
     let (trains, rate_hz) = (load.extent.trains, load.extent.traffic.rate_hz);

@@ -44,7 +44,7 @@ struct Said {
 }
 
 impl Said {
-    fn of(snapshot: &ParameterSnapshot, truth: &[EffectKind]) -> Said {
+    fn new(snapshot: &ParameterSnapshot, truth: &[EffectKind]) -> Said {
         let leading = EffectKind::from_number(snapshot.suspected_effect).expect("a known kind");
         let leading = Some(leading).filter(|&kind| kind != EffectKind::None);
         let others = snapshot.suspected_alternatives;
@@ -71,7 +71,7 @@ pub fn watch(data: &SimulatedDataset) -> Watched {
         let mut last_ns = None;
         for sample in &run.samples {
             sequence += 1;
-            let said = Said::of(pipeline.process(&TrainSample { sequence, ..*sample }), &truth);
+            let said = Said::new(pipeline.process(&TrainSample { sequence, ..*sample }), &truth);
             watched.note_raised(&said);
             let step_s = driven_s(&mut last_ns, sample);
             watched.driven_s += step_s;

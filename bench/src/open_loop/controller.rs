@@ -116,7 +116,7 @@ impl Controller {
         }
     }
 
-    /// Adds what became of the samples since counting began.
+    /// Adds the fate of the samples since counting began.
     pub fn account(&self, outcomes: &mut [TrialOutcome]) {
         for ([now, before], outcome) in self.answers.iter().zip(outcomes) {
             outcome.offered += self.sent - self.sent_before;

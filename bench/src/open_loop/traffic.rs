@@ -36,7 +36,7 @@ impl LoopTraffic {
     /// Returns a train of which no sample leaves before [`LoopTraffic::begin`].
     pub fn new(plan: TrafficPlan, train: TrainId, start_ns: i64, seed: u64) -> Self {
         let random = Chance::new(seed ^ train.0.wrapping_mul(0x9e37_79b9_7f4a_7c15));
-        let mut motion = DrivenMotion::of(train, start_ns);
+        let mut motion = DrivenMotion::new(train, start_ns);
         let next = (motion.sample(start_ns), start_ns);
         LoopTraffic { plan, motion, random, start_ns, number: 0, count: 0, next }
     }
@@ -120,7 +120,7 @@ pub struct DrivenMotion {
 
 impl DrivenMotion {
     /// Returns the motion of a train from a time on, in ns of the controller's clock.
-    pub fn of(train: TrainId, start_ns: i64) -> Self {
+    pub fn new(train: TrainId, start_ns: i64) -> Self {
         let noise = train.0.wrapping_mul(0x9e37_79b9) | 1;
         DrivenMotion { train, start_ns, phase: train.0 as f64 * 0.37, noise }
     }
@@ -219,7 +219,7 @@ mod swinging_train_tests {
     #[test]
     fn every_sample_of_the_motion_is_valid() {
         let train = TrainId(3);
-        let mut motion = DrivenMotion::of(train, 7);
+        let mut motion = DrivenMotion::new(train, 7);
         let model = TrainModel::bare("t", MASS_KG, Davis { a: 0.0, b: 0.0, c: 0.0 });
         let mut admission = Admission::new(train, model.into());
         for number in 1..=200_000_u64 {

@@ -211,10 +211,10 @@ impl Braking {
     }
 }
 
-/// Returns the declared value of what is looked for; of adhesion, what the declared brake would need.
+/// Returns the declared value of the quantity looked for; of adhesion, what the declared brake would need.
 pub fn declared(sought: BrakingCoefficient) -> f64 {
     let train = train();
-    let gear = DeclaredGear::of(&train.brake_gear).expect("a declared gear");
+    let gear = DeclaredGear::from_gear(&train.brake_gear).expect("a declared gear");
     match sought {
         BrakingCoefficient::Adhesion => {
             gear.declared_force_n(PRESSURE_PA) / (1000.0 * TrainModel::weight_kn(train.mass_kg))

@@ -149,7 +149,7 @@ impl BrakingScore {
     }
 
     /// Returns the errors of runs, pooled.
-    pub fn of<'a>(runs: impl Iterator<Item = &'a Vec<ScoredBraking>>) -> Self {
+    pub fn from_runs<'a>(runs: impl Iterator<Item = &'a Vec<ScoredBraking>>) -> Self {
         let (mut errors, mut relative, mut nees_of_runs) =
             (score::PaperScore::default(), Vec::new(), Vec::new());
         for run in runs.filter(|run| !run.is_empty()) {
@@ -169,7 +169,7 @@ pub fn score<const LAGS: usize>(
     settings: impl Fn(u64) -> EstimatorSettings + Sync,
 ) -> [BrakingScore; LAGS] {
     let runs = over_seeds(seeds, |seed| run(&settings(seed), &braking.simulate(seed), lags_steps));
-    std::array::from_fn(|lag| BrakingScore::of(runs.iter().map(|run| &run[lag])))
+    std::array::from_fn(|lag| BrakingScore::from_runs(runs.iter().map(|run| &run[lag])))
 }
 
 /// Settings of the scenario: only positions are measured, and every estimate counts.
@@ -294,7 +294,7 @@ mod tests {
         // Errors of +- one standard deviation: NEES 1, all covered, 1 % of the truth.
         let scored = |sign: f64| ScoredBraking { truth: 2.0, error: 0.02 * sign, std: 0.02 };
         let runs = [vec![scored(1.0), scored(-1.0)], vec![scored(1.0)]];
-        let score = BrakingScore::of(runs.iter());
+        let score = BrakingScore::from_runs(runs.iter());
         assert!((score.relative_percent - 1.0).abs() < 1e-12);
         assert!((score.rmse() - 0.02).abs() < 1e-15);
         assert!((score.errors.nees() - 1.0).abs() < 1e-12);
@@ -311,7 +311,7 @@ mod tests {
             let scored = |run| ScoredBraking { truth: 1.0, error: error(run), std: 1.0 };
             let runs: Vec<Vec<ScoredBraking>> =
                 (0..runs).map(|run| vec![scored(run); length]).collect();
-            BrakingScore::of(runs.iter())
+            BrakingScore::from_runs(runs.iter())
         };
         let drawn = score(0.6, 200, 100);
         // Twice as long a run halves the variance of 0.6; 0.1 of it is noise.

@@ -71,7 +71,7 @@ fn ratio_extras(seeds: Seeds) -> Vec<PaperRow> {
 /// Returns the stop from 350 km/h of figure 8.
 fn stop() -> [PaperRow; 2] {
     let train = train();
-    let gear = DeclaredGear::of(&train.brake_gear).expect("a declared gear");
+    let gear = DeclaredGear::from_gear(&train.brake_gear).expect("a declared gear");
     let force_n = |speed_mps: f64| gear.force_n(PRESSURE_PA, disc_friction(speed_mps), gear.ratio);
     let effort: Vec<EffortPoint> = (0..=350)
         .map(|kmh| {

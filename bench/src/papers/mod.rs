@@ -80,7 +80,7 @@ impl PapersArguments {
             report_line(&format!("{name}: {} seeds from {}", seeds.count, seeds.first));
             rows.extend(measure(seeds));
         }
-        let verdicts: Vec<PromiseVerdict> = rows.iter().map(PromiseVerdict::of).collect();
+        let verdicts: Vec<PromiseVerdict> = rows.iter().map(PromiseVerdict::from_row).collect();
         let judged = || rows.iter().zip(&verdicts);
         let records: Vec<Record> = judged().map(|(row, verdict)| record(row, verdict)).collect();
         let promised: usize = verdicts.iter().map(|it| it.promised.len()).sum();
@@ -165,7 +165,7 @@ mod tests {
     fn figures_stand_apart_from_notes() {
         let row =
             PaperRow { quantity: "mass, 3 km".into(), ..row() }.noted("paper's method: by hand");
-        let record = record(&row, &PromiseVerdict::of(&row));
+        let record = record(&row, &PromiseVerdict::from_row(&row));
         let of = |name: &str| record.cell(name).unwrap();
         assert_eq!((of("quantity"), of("note")), ("mass, 3 km", "paper's method: by hand"));
         assert_eq!((of("ours_over_bound"), of("coverage_percent")), ("1.10", "95.1"));

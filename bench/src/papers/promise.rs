@@ -76,7 +76,7 @@ pub struct PromiseVerdict {
 
 impl PromiseVerdict {
     /// Judges a row.
-    pub fn of(row: &PaperRow) -> Self {
+    pub fn from_row(row: &PaperRow) -> Self {
         let mut verdict = PromiseVerdict {
             nees_band: row.nees_freedom.filter(|freedom| *freedom > 0.0).map(nees_band),
             promised: Vec::new(),
@@ -176,25 +176,31 @@ mod tests {
 
     #[test]
     fn a_promise_is_broken_beyond_its_limit_and_few_runs_have_a_margin() {
-        assert!(PromiseVerdict::of(&row("w0, clean", 1.09, 200)).broken.is_empty());
-        assert_eq!(PromiseVerdict::of(&row("w0, clean", 1.2, 200)).broken, ["at most 1.1 bounds"]);
-        assert!(PromiseVerdict::of(&row("w0, 5 % outliers", 1.2, 200)).broken.is_empty());
-        assert!(PromiseVerdict::of(&row("w0, clean", 1.2, 8)).broken.is_empty());
-        assert!(!PromiseVerdict::of(&row("w0, clean", 3.0, 8)).broken.is_empty());
+        assert!(PromiseVerdict::from_row(&row("w0, clean", 1.09, 200)).broken.is_empty());
+        assert_eq!(
+            PromiseVerdict::from_row(&row("w0, clean", 1.2, 200)).broken,
+            ["at most 1.1 bounds"]
+        );
+        assert!(PromiseVerdict::from_row(&row("w0, 5 % outliers", 1.2, 200)).broken.is_empty());
+        assert!(PromiseVerdict::from_row(&row("w0, clean", 1.2, 8)).broken.is_empty());
+        assert!(!PromiseVerdict::from_row(&row("w0, clean", 3.0, 8)).broken.is_empty());
     }
 
     #[test]
     fn intervals_that_lie_are_named() {
         let wide = PaperRow { coverage: Some(0.99), nees: Some(0.5), ..row("w0, clean", 1.0, 200) };
-        assert_eq!(PromiseVerdict::of(&wide).broken, ["coverage 93-97 %", "NEES in its band"]);
+        assert_eq!(
+            PromiseVerdict::from_row(&wide).broken,
+            ["coverage 93-97 %", "NEES in its band"]
+        );
         let few = PaperRow { seeds: 8, ..wide.clone() };
-        assert!(PromiseVerdict::of(&few).broken.is_empty());
+        assert!(PromiseVerdict::from_row(&few).broken.is_empty());
         let named = PaperRow { paper: "Wang 2022", quantity: "in a headwind".into(), ..wide };
-        assert!(PromiseVerdict::of(&named).broken.is_empty());
-        assert!(PromiseVerdict::of(&named).may_be_wider.is_some());
+        assert!(PromiseVerdict::from_row(&named).broken.is_empty());
+        assert!(PromiseVerdict::from_row(&named).may_be_wider.is_some());
         let narrow = PaperRow { coverage: Some(0.9), nees: Some(1.5), ..named };
         assert_eq!(
-            PromiseVerdict::of(&narrow).broken,
+            PromiseVerdict::from_row(&narrow).broken,
             ["coverage from 93 % on", "NEES not above its band"]
         );
     }

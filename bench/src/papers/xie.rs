@@ -113,7 +113,7 @@ pub const PAPER_GRAVITY_MPS2: f64 = 9.8;
 /// Stopping distances and times: the paper's recursion in steps of 0.2 s and ours.
 fn stops() -> Vec<PaperRow> {
     let train = train();
-    let gear = DeclaredGear::of(&train.brake_gear).expect("a declared gear");
+    let gear = DeclaredGear::from_gear(&train.brake_gear).expect("a declared gear");
     let force_n = gear.declared_force_n(PRESSURE_PA);
     let effort = [EffortPoint { speed_mps: 0.0, force_n }];
     let davis = [train.resistance.a, train.resistance.b, train.resistance.c];

@@ -181,7 +181,8 @@ pub fn put_candidates(site: &DaemonSite, train: TrainId, count: u32) -> Result<S
     for number in 1..=count {
         let a = format!("[resistance]\na = 2.{number}");
         let text = ModelText { train: TRAIN.replace("[resistance]\na = 1.9", &a), track: None };
-        let origin = Origin::written("Of a measurement.", parent, UtcSecond::of(SystemTime::now()));
+        let origin =
+            Origin::written("Of a measurement.", parent, UtcSecond::from_time(SystemTime::now()));
         let new = NewModel { text, origin, answer_json: None, report_html: None };
         Store::at(&store).train(train).put(&new)?;
     }

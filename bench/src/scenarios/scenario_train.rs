@@ -21,7 +21,7 @@ enum Phase {
     Braking,
 }
 
-/// A moment of the drive: what was written, and the truth.
+/// A moment of the drive: the written values, and the truth.
 #[derive(Clone, Copy, Debug)]
 pub struct DriveMoment {
     /// As the controller wrote it.

@@ -12,7 +12,7 @@ const WRONG: f64 = 4.0;
 /// Share of the truth by which a worse answer than the declared one is worse.
 const WORSE_BY: f64 = 0.01;
 
-/// A usable answer: its error, its standard deviation, and the error of what is declared, over the truth.
+/// A usable answer: its error, its standard deviation, and the error of the declaration, over the truth.
 #[derive(Clone, Copy, Debug)]
 pub struct Answer {
     /// Error over the truth.

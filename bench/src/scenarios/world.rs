@@ -276,7 +276,7 @@ fn profile(
 /// Standard deviations of the ordinary mistakes, all at once; none by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mistakes {
-    /// Of a, b, c as a share of what is declared.
+    /// Of a, b, c as a share of the declaration.
     pub coefficient_share: f64,
     /// Of the traction and the brake force as reported, as a share.
     pub force_share: f64,

@@ -25,7 +25,7 @@ fn dataset(folder: &Path) -> Dataset {
     Dataset::load(&texts[..]).unwrap()
 }
 
-/// Returns what is said of a row of brakes, of a tram whose samples carry its mass.
+/// Returns the words on a row of brakes, of a tram whose samples carry its mass.
 fn answer(row: &str) -> ExplainAnswer {
     let mut rows = table::brakes();
     rows.retain(|(names, _)| names.join(", ") == row);

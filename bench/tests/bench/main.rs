@@ -1,4 +1,4 @@
-//! The measurements run, take what the documents name, and give what is right; no time decides.
+//! The measurements run, take what the documents name, and give the right answer; no time decides.
 
 mod commands;
 mod drive;

@@ -76,7 +76,7 @@ impl<E: End> Handle<E> {
     ) -> PyResult<Self> {
         let number = NUMBERS.fetch_add(1, Ordering::Relaxed);
         let opened: Result<(), ChannelError> = py.detach(move || {
-            close_what_this_thread_dropped();
+            close_dropped_ends();
             let host = Host::of(root.as_deref())?;
             let end = make(&host, TrainId(train_id))?;
             E::of_this_thread().with_borrow_mut(|ends| ends.insert(number, end));
@@ -142,7 +142,7 @@ fn close<E: End>(number: u64) {
     drop(end);
 }
 
-fn close_what_this_thread_dropped() {
+fn close_dropped_ends() {
     let own = current().id();
     let Ok(mut dropped) = DROPPED_ELSEWHERE.lock() else { return };
     let numbers: Vec<u64> =

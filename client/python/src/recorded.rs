@@ -31,7 +31,7 @@ pub(crate) fn json(answer: &impl Serialize) -> Result<String, Failure> {
 }
 
 /// Returns a path and the train that is meant.
-fn of(path: &Path, train: Option<u64>) -> DatasetSource<'_> {
+fn source(path: &Path, train: Option<u64>) -> DatasetSource<'_> {
     DatasetSource { path, train: train.map(TrainId) }
 }
 
@@ -39,7 +39,7 @@ fn of(path: &Path, train: Option<u64>) -> DatasetSource<'_> {
 #[pyfunction]
 pub(crate) fn check(py: Python<'_>, path: PathBuf, train: Option<u64>) -> PyResult<JsonAndText> {
     let answer = in_background(py, None, move |_| {
-        match checking::understand(of(&path, train), checking::SamplesOfRuns::Dropped) {
+        match checking::understand(source(&path, train), checking::SamplesOfRuns::Dropped) {
             Ok(understood) => Ok((json(&understood.answer(&path))?, understood.text())),
             Err(failure) => match failure.answer() {
                 Some(error) => {
@@ -61,7 +61,7 @@ pub(crate) fn read(
     train: Option<u64>,
 ) -> PyResult<(JsonAndText, Vec<Table>, Table)> {
     let read = in_background(py, None, move |_| {
-        let understood = checking::understand(of(&path, train), checking::SamplesOfRuns::Kept)?;
+        let understood = checking::understand(source(&path, train), checking::SamplesOfRuns::Kept)?;
         let wrong: Option<Failure> = understood.errors().next().map(|it| it.clone().into());
         let answer = (json(&understood.answer(&path))?, understood.text());
         match (understood, wrong) {

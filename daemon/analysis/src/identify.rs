@@ -151,7 +151,7 @@ fn is_permitted(quantity: Quantity, dataset: &Dataset) -> bool {
     };
     match quantity {
         Quantity::BrakeFriction | Quantity::BrakingRatio => {
-            DeclaredGear::of(&dataset.train.brake_gear).is_some()
+            DeclaredGear::from_gear(&dataset.train.brake_gear).is_some()
                 && dataset.runs.iter().any(has_pressure)
         }
         Quantity::Resistance | Quantity::Mass | Quantity::Adhesion => true,

@@ -34,7 +34,7 @@ pub(super) fn gradient_permille(of: &Recorded) -> Vec<f64> {
     let cells = cells(of.point_m, of.altitude_m);
     let fits = fits(&cells, HALF_WINDOW_M);
     let half_m = 0.5 * of.length_m;
-    let climb = Climb::of(&cells, (&fits, &self::fits(&cells, 2.0 * HALF_WINDOW_M)));
+    let climb = Climb::new(&cells, (&fits, &self::fits(&cells, 2.0 * HALF_WINDOW_M)));
     let under = |centre_m: f64| {
         // A train no longer than a cell or two is a point.
         if half_m <= CELL_M {
@@ -71,7 +71,7 @@ struct Climb(Vec<Climbed>);
 impl Climb {
     /// By the lines over a window and over one twice as wide. A line takes a share from a hill that grows by the square
     /// of the window: the two give the slope without it (Richardson 1911).
-    fn of(cells: &[Cell], (fits, wide): (&[SlopeFit], &[SlopeFit])) -> Self {
+    fn new(cells: &[Cell], (fits, wide): (&[SlopeFit], &[SlopeFit])) -> Self {
         let is_around = |it: &SlopeFit| it.aside_m.abs() <= ASIDE_MAX_M;
         let all = cells.iter().zip(fits.iter().zip(wide));
         let known = all.filter(|(_, (fit, _))| is_around(fit)).map(|(cell, (fit, wide))| {

@@ -1,4 +1,4 @@
-//! Whether what is declared of a train and a line can be true.
+//! Whether the declaration of a train and a line can be true.
 
 use dynocar_core::plausibility::Severity;
 use dynocar_core::plausibility::Severity::Warning;
@@ -8,7 +8,7 @@ use dynocar_model::train::numbers::LENGTH;
 use dynocar_shared::SampleField;
 use toml::Value;
 
-use super::dataset_diagnostic::Diagnostic;
+use super::diagnostic::Diagnostic;
 use super::keys::assign;
 use super::quantity::Quantity;
 use super::resolved::Resolved;

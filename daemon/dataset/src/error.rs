@@ -24,7 +24,7 @@ impl SourcePosition {
         SourcePosition { file: file.into(), line: None }
     }
 
-    /// Returns a problem at this place: what was expected, and what came.
+    /// Returns a problem at this place: the expected value, and what came.
     pub fn problem(self, words: impl Display) -> DatasetError {
         DatasetError { place: self, words: words.to_string() }
     }

@@ -75,7 +75,7 @@ impl Forces {
     /// that traction minus brake stays what was measured: setting it to zero would let half of
     /// the noise pass and bias every coasting. Where the other force is missing, it is set to
     /// zero.
-    pub fn of(table: &Table, speed_mps: &[f64], train: &TrainModel, order: &TimeOrder) -> Self {
+    pub fn new(table: &Table, speed_mps: &[f64], train: &TrainModel, order: &TimeOrder) -> Self {
         let (mut traction, mut brake) = match table.column(Quantity::ControlForce) {
             Some(control) => split(control, ForceSource::ControlForce),
             None => recorded(table, speed_mps, train),
@@ -282,9 +282,9 @@ mod tests {
         let manifest = Manifest::parse("dataset.toml", &text).unwrap();
         let table = Table::parse("a.csv", csv, (&manifest.layout, &manifest.columns)).unwrap();
         let times = table.column(Quantity::Time).unwrap();
-        let order = TimeOrder::of(times, vec![0; times.len()]);
+        let order = TimeOrder::new(times, vec![0; times.len()]);
         let train = parse_train("train.toml", train).unwrap();
-        Forces::of(&table, table.column(Quantity::Speed).unwrap(), &train, &order)
+        Forces::new(&table, table.column(Quantity::Speed).unwrap(), &train, &order)
     }
 
     const BOTH: &str = "traction_force={column='F',unit='kN'}\nbrake_force={column='B',unit='kN'}";

@@ -21,7 +21,7 @@
 //! - `clock_faults`: an hour of summer time, seconds without a fraction, rows in another order
 //! - `order`, `spikes`, `motion`, `forces`, `altitude`: from columns to time, speed,
 //!   position, forces and gradient
-//! - `resolved`, [`run`], [`quality`], [`dataset_diagnostic`], `diagnosing`, `declared`: samples,
+//! - `resolved`, [`run`], [`quality`], [`diagnostic`], [`dataset_diagnostic`], `diagnosing`, `declared`: samples,
 //!   counts and warnings
 //! - [`written`]: the three TOML files as they are written, and declared ones that change
 //! - [`guess`]: a description of files that nobody has described yet
@@ -34,6 +34,7 @@ mod corrections;
 pub mod dataset_diagnostic;
 mod declared;
 mod diagnosing;
+pub mod diagnostic;
 pub mod document;
 pub mod error;
 mod forces;
@@ -62,7 +63,8 @@ pub mod written;
 mod tests;
 
 pub use clock::TimeFormat;
-pub use dataset_diagnostic::{DatasetDiagnostic, Diagnostic};
+pub use dataset_diagnostic::DatasetDiagnostic;
+pub use diagnostic::Diagnostic;
 pub use document::top_keys;
 pub use error::{DatasetError, FileProblem, SourcePosition};
 pub use forces::{ForceSource, is_stamped_late, stamped_late};

@@ -173,9 +173,9 @@ impl Manifest {
             name: NAME.need_quoted(&dataset)?.into(),
             description: DESCRIPTION.quoted(&dataset)?.map(Into::into),
             position_reference: reference.unwrap_or(PositionReference::Centre),
-            layout: TextLayout::of(&dataset)?,
+            layout: TextLayout::from_section(&dataset)?,
             train_file: file_of(&train, &keys::train_file::FILE)?,
-            train_rows: TrainRows::of(&train)?,
+            train_rows: TrainRows::from_train(&train)?,
             track_file: match root.table(keys::track_file::TABLE)? {
                 Some(section) => {
                     allow(&section, keys::track_file::KEYS)?;

@@ -46,7 +46,7 @@ pub struct OrderCounts {
 impl TimeOrder {
     /// Looks at the rows' times in s, all finite; `timeless_before` counts the rows without a
     /// time that stood before each of them in the file.
-    pub fn of(times_s: &[f64], timeless_before: Vec<u64>) -> Self {
+    pub fn new(times_s: &[f64], timeless_before: Vec<u64>) -> Self {
         let in_order = longest_increasing(times_s);
         let mut counts = OrderCounts::default();
         let displaced_s = counts.count_displaced(times_s, &in_order);
@@ -172,7 +172,7 @@ mod tests {
     use super::*;
 
     fn order_of(times_s: &[f64]) -> TimeOrder {
-        TimeOrder::of(times_s, vec![0; times_s.len()])
+        TimeOrder::new(times_s, vec![0; times_s.len()])
     }
 
     #[test]
@@ -205,7 +205,7 @@ mod tests {
     #[test]
     fn a_row_without_a_time_is_lost_once() {
         let times = [0.0, 1.0, 2.0, 5.0, 6.0, 7.0, 8.0];
-        let order = TimeOrder::of(&times, vec![0, 0, 0, 1, 0, 0, 0]);
+        let order = TimeOrder::new(&times, vec![0, 0, 0, 1, 0, 0, 0]);
         assert_eq!((order.counts.gaps, order.counts.missing_rows), (1, 1));
         assert_eq!(order.lost_before[3], 2, "one without a time, one not there");
     }

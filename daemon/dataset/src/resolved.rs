@@ -62,15 +62,15 @@ pub(super) struct Resolved<'d> {
 }
 
 impl<'d> Resolved<'d> {
-    pub fn of(context: Context<'d>, entry: &'d RunEntry, mut table: Table) -> Self {
+    pub fn new(context: Context<'d>, entry: &'d RunEntry, mut table: Table) -> Self {
         let (mut timeless_before, rows_without_time) = drop_timeless(&mut table);
         let clock_faults = mend_times(&mut table, &mut timeless_before);
         table.hold_last(Quantity::Passengers);
         let column = |quantity| table.column(quantity).unwrap_or_default();
         let times_s = column(Quantity::Time).to_vec();
-        let order = TimeOrder::of(&times_s, timeless_before);
-        let speeds = Speeds::of(column(Quantity::Speed), &order);
-        let forces = Forces::of(&table, &speeds.speed_mps, context.train, &order);
+        let order = TimeOrder::new(&times_s, timeless_before);
+        let speeds = Speeds::new(column(Quantity::Speed), &order);
+        let forces = Forces::new(&table, &speeds.speed_mps, context.train, &order);
         let placement = Placement {
             reference: context.manifest.position_reference,
             direction: f64::from(entry.direction),

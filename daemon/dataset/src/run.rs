@@ -8,8 +8,8 @@ use dynocar_model::train::PowerTrain;
 use dynocar_model::units::Unit;
 use dynocar_shared::{SampleField, TrainSample};
 
-use super::dataset_diagnostic::{Diagnostic, read_as};
 use super::diagnosing::diagnostics;
+use super::diagnostic::{Diagnostic, read_as};
 use super::error::{DatasetError, SourcePosition};
 
 use super::forces::{self, ForceSource};
@@ -202,7 +202,7 @@ pub(super) fn read(
     };
     let rows = table.lines.rows;
     let has_speed = table.filled(Quantity::Speed).is_some();
-    let resolved = Resolved::of(context, entry, table);
+    let resolved = Resolved::new(context, entry, table);
     let column = |quantity| context.manifest.mapping(quantity).map_or("", |it| &it.column);
     for (quantity, is_there) in
         [(Quantity::Time, !resolved.times_s.is_empty()), (Quantity::Speed, has_speed)]
@@ -260,7 +260,7 @@ fn of_text(manifest: &Manifest, label: &str, text: &str) -> Result<Table, Datase
     };
     let table = Table::parse(label, &own, (layout, columns))?;
     if *train_rows == TrainRows::Unsaid
-        && let Some(trains) = TrainsColumn::of(text, layout)
+        && let Some(trains) = TrainsColumn::new(text, layout)
     {
         trains.refuse(label, &table)?;
     }

@@ -38,7 +38,7 @@ pub(super) struct Speeds {
 
 impl Speeds {
     /// From the column, given the rows' order.
-    pub fn of(column: &[f64], order: &TimeOrder) -> Self {
+    pub fn new(column: &[f64], order: &TimeOrder) -> Self {
         let (mut zeroed, mut negative) = (0, 0);
         let mut speed_mps = column.to_vec();
         for speed in &mut speed_mps {
@@ -143,8 +143,8 @@ mod tests {
     }
 
     fn integrated(placement: Placement, times: &[f64], column: &[f64]) -> Vec<f64> {
-        let order = TimeOrder::of(times, vec![0; times.len()]);
-        placement.integrate(times, &Speeds::of(column, &order), &order)
+        let order = TimeOrder::new(times, vec![0; times.len()]);
+        placement.integrate(times, &Speeds::new(column, &order), &order)
     }
 
     #[test]
@@ -176,8 +176,8 @@ mod tests {
 
     #[test]
     fn only_the_noise_of_standstill_is_set_to_zero() {
-        let order = TimeOrder::of(&[0.0, 1.0, 2.0], vec![0; 3]);
-        let speeds = Speeds::of(&[-0.05, -3.0, 1.0], &order);
+        let order = TimeOrder::new(&[0.0, 1.0, 2.0], vec![0; 3]);
+        let speeds = Speeds::new(&[-0.05, -3.0, 1.0], &order);
         assert_eq!(speeds.speed_mps, [0.0, -3.0, 1.0]);
         assert_eq!((speeds.zeroed, speeds.negative), (1, 1));
     }

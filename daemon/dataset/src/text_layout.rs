@@ -57,7 +57,7 @@ impl TextLayout {
     };
 
     /// Reads the keys of `[dataset]`; what is left out is plain.
-    pub(super) fn of(section: &Item) -> Result<Self, DatasetError> {
+    pub(super) fn from_section(section: &Item) -> Result<Self, DatasetError> {
         let units_row = section.truth(UNITS_ROW.name)?.unwrap_or(false);
         let mut layout = TextLayout { units_row, ..Self::PLAIN };
         let encoding = ENCODING.named(section, "encoding", by_name, USUAL)?;
@@ -125,7 +125,7 @@ pub enum TrainRows {
 
 impl TrainRows {
     /// Reads the key of `[train]`.
-    pub(super) fn of(train: &Item) -> Result<Self, DatasetError> {
+    pub(super) fn from_train(train: &Item) -> Result<Self, DatasetError> {
         let (key, expected) = (ROWS.name, ROWS.rule.allowed);
         if !train.has(key) {
             return Ok(TrainRows::Unsaid);

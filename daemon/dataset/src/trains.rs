@@ -76,7 +76,7 @@ pub struct TrainsColumn {
 
 impl TrainsColumn {
     /// Returns the trains that a text's rows are of; `None` where no column names several.
-    pub fn of(text: &str, layout: &TextLayout) -> Option<Self> {
+    pub fn new(text: &str, layout: &TextLayout) -> Option<Self> {
         let (name, index) = column(text, layout, names_trains)?;
         let mut cells = TrainCells::default();
         rows(text, layout, |row, line| {
@@ -161,7 +161,7 @@ pub fn only<'t>(
         }
     });
     if count == 0 {
-        return Err(no_row(label, (name, value), TrainsColumn::of(text, layout)));
+        return Err(no_row(label, (name, value), TrainsColumn::new(text, layout)));
     }
     let mut others = others.into_iter().peekable();
     let kept = text.split_inclusive('\n').zip(1..).map(|(whole, line)| {

@@ -42,7 +42,7 @@ pub struct DescriptionFiles {
 
 impl DescriptionFiles {
     /// Returns the FMU's own files at a location, as the simulator names it.
-    pub fn of(resources: String) -> Self {
+    pub fn from_resources(resources: String) -> Self {
         DescriptionFiles { resources, train: CString::default(), track: CString::default() }
     }
 

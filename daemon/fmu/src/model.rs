@@ -72,7 +72,7 @@ impl Model {
         Model {
             interface,
             phase: Phase::Instantiated,
-            files: DescriptionFiles::of(resources),
+            files: DescriptionFiles::from_resources(resources),
             inputs: Inputs::default(),
             beginning: BEGINNING,
             start_s: 0.0,

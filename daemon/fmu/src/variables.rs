@@ -55,7 +55,7 @@ impl Interface {
     }
 }
 
-/// A file that describes what is declared.
+/// A file that describes the declaration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ModelFile {
     /// The train's.

@@ -33,11 +33,11 @@ message! {
 impl Event {
     /// Of a train, seen now.
     pub fn now(train: TrainId, kind: EventKind, text: String) -> Self {
-        Event::of(train, &TrainChange::new(kind, text))
+        Event::new(train, &TrainChange::new(kind, text))
     }
 
     /// Returns the event of a change of a train, seen now.
-    pub fn of(train: TrainId, change: &TrainChange) -> Self {
+    pub fn new(train: TrainId, change: &TrainChange) -> Self {
         Event {
             monotonic_ns: monotonic_now_ns(),
             train_id: train.0,

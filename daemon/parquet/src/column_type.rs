@@ -61,7 +61,7 @@ impl ColumnType {
     }
 
     /// Returns the type of a field of a file's schema; `hint` is that of Arrow's schema.
-    pub fn of(field: &Type, hint: Option<Hint>) -> Self {
+    pub fn from_field(field: &Type, hint: Option<Hint>) -> Self {
         let info = field.get_basic_info();
         let is_repeated =
             info.has_repetition() && info.repetition() == parquet::basic::Repetition::REPEATED;
@@ -78,7 +78,7 @@ impl ColumnType {
 
 /// Lists and structures in words.
 fn nested(field: &Type) -> String {
-    let words = |it: &Type| ColumnType::of(it, None).words;
+    let words = |it: &Type| ColumnType::from_field(it, None).words;
     let fields = field.get_fields();
     if let (true, [list]) = (is_list(field), fields) {
         let entry = Some(list).filter(|it| it.is_group()).and_then(|it| it.get_fields().first());

@@ -75,8 +75,8 @@ impl ParquetFile {
         let leaves: BTreeMap<usize, usize> = (0..schema.num_columns()).map(of_leaf).collect();
         let column = |(field, hint): (usize, Hint)| FileColumn {
             name: fields[field].name().to_owned(),
-            column_type: ColumnType::of(&fields[field], Some(hint)),
-            entries: entry_of(&fields[field]).map(|it| ColumnType::of(it, None)),
+            column_type: ColumnType::from_field(&fields[field], Some(hint)),
+            entries: entry_of(&fields[field]).map(|it| ColumnType::from_field(it, None)),
             leaf: leaves.get(&field).copied().unwrap_or(0),
         };
         let columns = hints.into_iter().enumerate().map(column).collect();

@@ -48,7 +48,7 @@ pub struct ParquetContent {
 ///
 /// # Errors
 ///
-/// Names file and column, and what was expected there.
+/// Names file and column, and the expected value there.
 pub fn read(path: &Path) -> Result<ParquetContent, ParquetFileError> {
     let mut content = ParquetContent::default();
     let mut metadata = BTreeMap::new();

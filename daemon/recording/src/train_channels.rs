@@ -207,7 +207,7 @@ impl TrainChannel {
                 *taken = TakenSnapshot { epoch: it.epoch, sequence: it.sequence, taken_ns: now_ns };
             }
             for change in changes {
-                sink.take(Message::Event(&Event::of(train, change)))?;
+                sink.take(Message::Event(&Event::new(train, change)))?;
             }
         }
         Ok(())
@@ -263,7 +263,7 @@ impl TrainChannel {
                 }
                 _ => {}
             }
-            sink.take(Message::Event(&Event::of(train, &change)))?;
+            sink.take(Message::Event(&Event::new(train, &change)))?;
         }
         Ok(())
     }

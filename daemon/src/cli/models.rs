@@ -92,7 +92,7 @@ struct Signed {
 /// A model or train that is not there is an input failure.
 pub fn execute(arguments: &ModelsArguments) -> Result<(), Failure> {
     let models = chosen(arguments)?;
-    let history = ModelHistory::of(&models).map_err(failure)?;
+    let history = ModelHistory::from_train(&models).map_err(failure)?;
     let find = |name: &str| found(&history, name);
     let text = match &arguments.command {
         ModelsCommand::List => {
@@ -309,7 +309,7 @@ fn decide(models: &TrainModels, what: ModelChoice, signed: &Signed) -> Result<St
         what,
         by: signed.by.clone(),
         reason: signed.reason.clone(),
-        at: UtcSecond::of(SystemTime::now()),
+        at: UtcSecond::from_time(SystemTime::now()),
     };
     let number = models.decide(&new).map_err(failure)?;
     let in_force = models.in_force().map_err(failure)?;

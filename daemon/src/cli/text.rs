@@ -77,7 +77,7 @@ pub fn short(value: f64, decimals: usize) -> String {
     if text == "-0" { "0".into() } else { text.into() }
 }
 
-/// Returns an entry: a key and what is said of it, broken into lines.
+/// Returns an entry: a key and the words on it, broken into lines.
 pub fn line(key: &str, value: &str) -> String {
     let mut lines = wrap(value, WIDTH - KEY_WIDTH).into_iter();
     let first = lines.next().unwrap_or_default();

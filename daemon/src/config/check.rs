@@ -255,7 +255,7 @@ fn check_pipeline_trains(
         .collect()
 }
 
-/// Checks the store and what becomes of models on trial; the directory must be there when the daemon starts.
+/// Checks the store and the fate of models on trial; the directory must be there when the daemon starts.
 fn check_models(checker: &Checker, raw: RawModels) -> Result<ModelsConfig, ConfigError> {
     let directory = checker.folder().join(&raw.directory);
     if !directory.is_dir() {

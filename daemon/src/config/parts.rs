@@ -110,7 +110,7 @@ pub(super) const fn default_interval_s() -> u64 {
     30
 }
 
-/// The store of models, and what becomes of those on trial.
+/// The store of models, and the fate of those on trial.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelsConfig {
     /// The store's directory.

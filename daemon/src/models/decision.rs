@@ -126,7 +126,7 @@ impl ModelHistory {
     /// # Errors
     ///
     /// When models or decisions cannot be read.
-    pub fn of(train: &TrainModels) -> Result<Self, ModelsError> {
+    pub fn from_train(train: &TrainModels) -> Result<Self, ModelsError> {
         let Listing { models, left_out } = train.list()?;
         let decisions = train.decisions()?;
         let declared = models.iter().rev().find(|it| it.origin.parent.is_none());

@@ -38,7 +38,7 @@ pub enum ModelsError {
     Changed {
         /// The model's folder.
         path: PathBuf,
-        /// The hash of what is there.
+        /// The hash of the present contents.
         found: ModelHash,
     },
     /// There is no such model.

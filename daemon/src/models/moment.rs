@@ -23,7 +23,7 @@ pub struct NoMoment(String);
 
 impl UtcSecond {
     /// Returns the second in which an instant lies; the first of 1970 for one before.
-    pub fn of(instant: SystemTime) -> Self {
+    pub fn from_time(instant: SystemTime) -> Self {
         UtcSecond { unix_s: instant.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs()) }
     }
 
@@ -89,7 +89,7 @@ mod tests {
             let moment = UtcSecond { unix_s };
             assert_eq!(moment.to_string().parse(), Ok(moment));
         }
-        let moment = UtcSecond::of(UNIX_EPOCH + Duration::from_millis(1_772_323_199_999));
+        let moment = UtcSecond::from_time(UNIX_EPOCH + Duration::from_millis(1_772_323_199_999));
         assert_eq!(moment.to_string(), "2026-02-28T23:59:59Z");
         assert_eq!(moment.day(), "2026-02-28");
         let days = [0, 11_016, 11_017, 20_453].map(|day| UtcSecond { unix_s: 86_400 * day }.day());

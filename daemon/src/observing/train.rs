@@ -164,7 +164,7 @@ fn note_pipeline(
         changes.push(TrainChange { status: Some(now.status), ..change });
     }
     if known.unwrap_or_default().suspect != now.suspect {
-        let (kind, text) = match Suspicion::of(it) {
+        let (kind, text) = match Suspicion::from_snapshot(it) {
             None => (EventKind::SuspicionEnded, "nothing is suspected".to_owned()),
             Some(suspicion) => (EventKind::SuspicionRaised, suspicion.to_string()),
         };

@@ -58,7 +58,7 @@ pub struct Suspicion {
 
 impl Suspicion {
     /// Returns the suspicion in a snapshot; `None` if there is none.
-    pub fn of(it: &ParameterSnapshot) -> Option<Self> {
+    pub fn from_snapshot(it: &ParameterSnapshot) -> Option<Self> {
         let effect = EffectKind::from_number(it.suspected_effect);
         (effect != Some(EffectKind::None)).then_some(Suspicion {
             effect,
@@ -126,16 +126,16 @@ mod suspicion_tests {
     #[test]
     fn a_suspicion_is_named_with_its_force_and_its_competing_hypotheses() {
         let mut snapshot = ParameterSnapshot::empty();
-        assert_eq!(Suspicion::of(&snapshot), None);
+        assert_eq!(Suspicion::from_snapshot(&snapshot), None);
         snapshot.suspected_effect = EffectKind::DraggingBrake as u32;
         snapshot.suspected_alternatives = EffectKind::Wind.bit();
         (snapshot.suspicion_age_s, snapshot.suspicion_evidence) = (132, 45.6);
         (snapshot.unexplained_force_n, snapshot.unexplained_force_std_n) = (12_340.0, 500.0);
-        let suspicion = Suspicion::of(&snapshot).unwrap();
+        let suspicion = Suspicion::from_snapshot(&snapshot).unwrap();
         let words = "dragging_brake for 2 min, evidence 46, could also be: wind";
         assert_eq!(suspicion.to_string(), words);
         assert_eq!(suspicion.force(), "+12.34 ± 0.98 kN");
         snapshot.suspected_effect = 99;
-        assert!(Suspicion::of(&snapshot).unwrap().to_string().contains("newer daemon"));
+        assert!(Suspicion::from_snapshot(&snapshot).unwrap().to_string().contains("newer daemon"));
     }
 }

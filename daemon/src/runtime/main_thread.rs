@@ -223,7 +223,7 @@ impl PipelineLog {
             warn!(pipeline, train, lost, "samples lost");
         }
         self.lost = snapshot.samples_lost;
-        let suspicion = Suspicion::of(snapshot);
+        let suspicion = Suspicion::from_snapshot(snapshot);
         let suspect = suspicion.map_or(0, |it| it.effect.map_or(u32::MAX, |it| it as u32));
         // Nothing suspected is no news before something is.
         if self.suspects.look((suspect, 0), now).is_none()
@@ -246,7 +246,7 @@ impl PipelineLog {
         );
     }
 
-    /// A status that wants a person is a warning, with what to do; any other is information.
+    /// A status that wants a person is a warning, with the recommended action; any other is information.
     fn report_status(&self, snapshot: &ParameterSnapshot, untold: &[(StatusAndReason, u64)]) {
         let (pipeline, train) = (self.pipeline.name.as_str(), self.pipeline.train.0);
         let words = |(status, reason): StatusAndReason| {
@@ -261,7 +261,7 @@ impl PipelineLog {
             .map(|((status, reason), count)| format!("{status} ({reason}) {count}"))
             .collect();
         let untold = (!untold.is_empty()).then(|| untold.join(", "));
-        if Verdict::of(status, Some(reason)) == Verdict::Ok {
+        if Verdict::new(status, Some(reason)) == Verdict::Ok {
             info!(pipeline, train, %status, %reason, untold, "status");
             return;
         }

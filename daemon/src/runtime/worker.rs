@@ -169,7 +169,7 @@ impl Worker {
         self.last_heartbeat_ns = now_ns;
         self.idler.serve_newcomers();
         for channel in &mut self.channels {
-            channel.count_what_was_left(self.epoch, now_ns);
+            channel.count_leftovers(self.epoch, now_ns);
             channel.change_models(self.epoch, now_ns);
         }
         for slot in self.channels.iter_mut().flat_map(|channel| &mut channel.slots) {
@@ -189,7 +189,7 @@ impl TrainChannel {
 
     /// When nobody drives the train any more, counts as lost what the last one published and no
     /// port kept.
-    fn count_what_was_left(&mut self, epoch: u64, now_ns: i64) {
+    fn count_leftovers(&mut self, epoch: u64, now_ns: i64) {
         // Before the look for samples: what is on its way then comes first.
         let Some(ended) = self.count.ended() else { return };
         self.found = self.next();

@@ -30,7 +30,7 @@ fn settle_train(
     train: &mut TrainConfig,
     rule: &Rule,
 ) -> Result<(), NotInForce> {
-    let declared = models.put_declared(&train.text, UtcSecond::of(SystemTime::now()))?;
+    let declared = models.put_declared(&train.text, UtcSecond::from_time(SystemTime::now()))?;
     let Some(hash) = models.in_force()? else { return Ok(()) };
     permitted(models, rule, hash)?;
     let (id, added) = (train.id.0, models.stored(hash)?.origin.adds());
@@ -77,7 +77,7 @@ pub fn permitted(models: &TrainModels, rule: &Rule, hash: ModelHash) -> Result<(
     }
 }
 
-/// Returns the train's configuration with another model of the store in place of what is declared.
+/// Returns the train's configuration with another model of the store in place of the declaration.
 ///
 /// # Errors
 ///

@@ -39,7 +39,7 @@ pub struct RivalEstimate {
 
 impl RivalEstimate {
     /// Returns the estimate of a snapshot of a pipeline.
-    pub fn of(pipeline: &str, snapshot: &ParameterSnapshot) -> Self {
+    pub fn new(pipeline: &str, snapshot: &ParameterSnapshot) -> Self {
         let count = snapshot.parameter_count as usize;
         let values = snapshot.parameters.iter().take(count).enumerate().map(|(index, &number)| {
             let name = Parameter::from_number(number).map_or("unknown", Parameter::name);

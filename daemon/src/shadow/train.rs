@@ -188,7 +188,7 @@ impl ShadowTrain {
         let all = std::iter::once(&self.trials.in_force).chain(&self.trials.rivals);
         let tried = all.map(|rival| TriedModel {
             model: ModelHash(rival.model),
-            last: UtcSecond::of(now),
+            last: UtcSecond::from_time(now),
             against: against(rival),
             error_mps: rival.ledger.all.rmse_mps(),
             error_ratio: rival.evidence.error_ratio(),
@@ -278,7 +278,7 @@ impl ShadowTrain {
 
     fn decide(&mut self, hash: ModelHash, reason: String, now: SystemTime) {
         let what = Rule::choice(&self.standing, hash);
-        let at = UtcSecond::of(now);
+        let at = UtcSecond::from_time(now);
         info!(train = self.id(), model = %hash, "decided by rule: {reason}");
         let decision = NewDecision { what, by: RULE.into(), reason, at };
         match self.models.decide(&decision) {
@@ -335,7 +335,7 @@ impl ShadowTrain {
 
     fn estimates(&self, pipelines: &[Pipeline]) -> Vec<RivalEstimate> {
         let estimate = |(placed, pipeline): (&PlacedPipeline, &Pipeline)| {
-            RivalEstimate::of(&placed.settings.name, pipeline.snapshot())
+            RivalEstimate::new(&placed.settings.name, pipeline.snapshot())
         };
         self.placed.iter().zip(pipelines).map(estimate).collect()
     }

@@ -25,7 +25,7 @@ pub struct ModelKey {
 
 impl ModelKey {
     /// Returns the key of a configured train.
-    pub fn of(train: &TrainConfig) -> Self {
+    pub fn from_train(train: &TrainConfig) -> Self {
         ModelKey {
             train: train.id.0,
             wheel_set: train.wheel_set.clone(),
@@ -125,7 +125,7 @@ impl StateContent {
     ///
     /// # Errors
     ///
-    /// When a key or value is not what was expected.
+    /// When a key or value is not the expected value.
     pub fn from_text(path: &Path, text: &str) -> Result<Self, StateError> {
         let malformed = |message: String| StateProblem::Malformed(message).at(path);
         let raw: RawState =

@@ -61,7 +61,7 @@ impl StateKeeper {
             .map(|(train, estimates)| {
                 Ok(KeptTrain {
                     observed: ObservedTrain::open(host, train.id)?,
-                    content: StateContent { key: ModelKey::of(train), estimates },
+                    content: StateContent { key: ModelKey::from_train(train), estimates },
                     is_changed: [false; 2],
                 })
             })
@@ -146,7 +146,7 @@ fn keep(
     snapshot: &ParameterSnapshot,
     now: &Stamp,
 ) -> bool {
-    let Ok(estimate) = KeptEstimate::of(snapshot) else { return false };
+    let Ok(estimate) = KeptEstimate::from_snapshot(snapshot) else { return false };
     let stored = StoredEstimate {
         train: content.key.train,
         pipeline: pipeline.to_owned(),

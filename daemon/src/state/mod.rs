@@ -48,7 +48,7 @@ pub fn load(directory: &Path, train: &TrainConfig) -> Result<Vec<StoredEstimate>
     let path = path_of(directory, train.id);
     let Some(text) = file::read(&path)? else { return Ok(Vec::new()) };
     let content = StateContent::from_text(&path, &text)?;
-    content.require_key(&path, &ModelKey::of(train))?;
+    content.require_key(&path, &ModelKey::from_train(train))?;
     Ok(content.estimates)
 }
 

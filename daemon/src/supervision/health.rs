@@ -34,7 +34,7 @@ named! {
 
 impl Verdict {
     /// Returns the verdict on a pipeline that is vouched for.
-    pub const fn of(status: Status, reason: Option<Reason>) -> Self {
+    pub const fn new(status: Status, reason: Option<Reason>) -> Self {
         match (status, reason) {
             (Status::Degraded | Status::Invalid, _) => Verdict::Degraded,
             (_, Some(Reason::BadInput)) => Verdict::Degraded,
@@ -110,7 +110,7 @@ impl PipelineHealth {
     }
 
     fn verdict(&self) -> Verdict {
-        if self.is_stale { Verdict::Stale } else { Verdict::of(self.status, self.reason) }
+        if self.is_stale { Verdict::Stale } else { Verdict::new(self.status, self.reason) }
     }
 }
 
@@ -211,7 +211,7 @@ fn pipelines_of(observed: &mut ObservedTrain) -> Vec<PipelineHealth> {
             .collect(),
         age_ms: reading.age_ns / 1_000_000,
         is_stale: reading.is_stale,
-        suspicion: Suspicion::of(reading.snapshot),
+        suspicion: Suspicion::from_snapshot(reading.snapshot),
         refused: refusals(&reading.snapshot.rejected_by_reason),
     };
     observed.readings(monotonic_now_ns()).map(of_reading).collect()
@@ -225,11 +225,11 @@ mod tests {
 
     #[test]
     fn good_brakes_on_a_good_rail_are_no_degradation() {
-        let waiting = |reason| Verdict::of(Status::Unestimated, Some(reason));
+        let waiting = |reason| Verdict::new(Status::Unestimated, Some(reason));
         assert_eq!(waiting(Reason::OnlyLowerBound), Verdict::Ok);
         assert_eq!(waiting(Reason::EstimateStale), Verdict::Ok);
         assert_eq!(waiting(Reason::BadInput), Verdict::Degraded, "samples that are refused");
-        let large = Verdict::of(Status::Degraded, Some(Reason::InnovationsTooLarge));
+        let large = Verdict::new(Status::Degraded, Some(Reason::InnovationsTooLarge));
         assert_eq!(large, Verdict::Degraded);
         let silent = PipelineHealth { is_stale: true, ..pipeline(Reason::DaemonSilent) };
         assert_eq!(silent.verdict(), Verdict::Stale);
@@ -283,7 +283,7 @@ mod tests {
         let mut snapshot = dynocar_shared::ParameterSnapshot::empty();
         snapshot.suspected_effect = EffectKind::DraggingBrake as u32;
         let monitor = PipelineHealth {
-            suspicion: Suspicion::of(&snapshot),
+            suspicion: Suspicion::from_snapshot(&snapshot),
             ..pipeline(Reason::InnovationsNotWhite)
         };
         let refusing = PipelineHealth {

@@ -163,14 +163,14 @@ impl Families {
         }
         self.innovation.get_or_create(&labels).set(it.innovation_mean_square);
         self.unexplained.get_or_create(&labels).set(it.unexplained_force_n);
-        let suspicion = Suspicion::of(it);
+        let suspicion = Suspicion::from_snapshot(it);
         if suspicion.is_some() || it.pipeline_kind() == Some(PipelineKind::ResidualMonitor) {
             let effect =
                 suspicion.map_or("none", |it| it.effect.map_or("unknown", EffectKind::name));
             let age_s = suspicion.map_or(0, |it| it.age_s);
             self.suspected.get_or_create(&with("effect", effect)).set(f64::from(age_s));
         }
-        let is_wanted = Verdict::of(reading.status(), reading.reason()) != Verdict::Ok;
+        let is_wanted = Verdict::new(reading.status(), reading.reason()) != Verdict::Ok;
         let labels = with("reason", reading.reason().map_or("unknown", Reason::name));
         self.attention.get_or_create(&labels).set(f64::from(u8::from(is_wanted)));
         for (index, number) in it.parameters.iter().enumerate().take(it.parameter_count as usize) {

@@ -148,7 +148,7 @@ pub fn samples(train: &TrainState) -> String {
 pub fn residual(train: &TrainState) -> Option<(String, String)> {
     let snapshot = &train.residual()?.snapshot;
     let force = force_words(snapshot.unexplained_force_n, snapshot.unexplained_force_std_n);
-    let suspect = Suspicion::of(snapshot).map_or("none".to_owned(), |it| it.to_string());
+    let suspect = Suspicion::from_snapshot(snapshot).map_or("none".to_owned(), |it| it.to_string());
     Some((force, suspect))
 }
 

@@ -60,7 +60,7 @@ pub fn write_updated<'s>(
     let texts = (read(&train.path)?, track.map(|file| read(&file.path)).transpose()?);
     let labels = (&train.path[..], track.map_or(TRACK_FILE, |file| &file.path));
     let declared = (&texts.0[..], texts.1.as_deref());
-    let mut grown = UpdatedTables::of(explanation, declared, labels)?;
+    let mut grown = UpdatedTables::new(explanation, declared, labels)?;
     if let (Some(declared), Some(track)) = (track, &mut grown.track) {
         keep_alignments(track, &source.path_of(&declared.path), folder);
     }
@@ -102,7 +102,7 @@ pub fn updated_texts(
     labels: (&str, &str),
     source: &str,
 ) -> Result<UpdatedTexts, UpdatedModelError> {
-    Ok(UpdatedTables::of(explanation, (train, track), labels)?.texts(explanation, labels, source))
+    Ok(UpdatedTables::new(explanation, (train, track), labels)?.texts(explanation, labels, source))
 }
 
 /// An updated model as tables.
@@ -113,7 +113,7 @@ struct UpdatedTables {
 }
 
 impl UpdatedTables {
-    fn of(
+    fn new(
         explanation: &Explanation,
         (train, track): (&str, Option<&str>),
         labels: (&str, &str),

@@ -95,8 +95,8 @@ impl Host {
         for directory in [root, &root.join(TRAINS)] {
             make_private_directory(directory)?;
         }
-        let identity =
-            DirectoryIdentity::of(root).map_err(unusable(root, "looking at the directory"))?;
+        let identity = DirectoryIdentity::from_path(root)
+            .map_err(unusable(root, "looking at the directory"))?;
         Ok(Host { root: root.to_path_buf(), identity })
     }
 
@@ -128,7 +128,7 @@ impl Host {
     ///
     /// [`ChannelError::RootGone`] when it was removed, or another one took its place.
     pub fn require_root(&self) -> Result<(), ChannelError> {
-        match DirectoryIdentity::of(&self.root) {
+        match DirectoryIdentity::from_path(&self.root) {
             Ok(identity) if identity == self.identity => Ok(()),
             _ => Err(ChannelError::RootGone { path: self.root.clone() }),
         }

@@ -31,7 +31,7 @@ pub(crate) struct DirectoryIdentity {
 
 impl DirectoryIdentity {
     /// Returns the identity of the directory at a path.
-    pub(crate) fn of(path: &Path) -> std::io::Result<Self> {
+    pub(crate) fn from_path(path: &Path) -> std::io::Result<Self> {
         let attributes = std::fs::metadata(path)?;
         let born = attributes.created().ok().and_then(|it| it.duration_since(UNIX_EPOCH).ok());
         let born_ns = born.map_or(0, |it| it.as_nanos() as u64);

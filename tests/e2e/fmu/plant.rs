@@ -39,7 +39,7 @@ fn set(fmu: &Fmu, name: &str, value: f64) {
 fn of_updated(site: &DaemonSite, grown: &str) -> Fmu {
     done(site, &["fmu", "--plant", "-o", "train.fmu", "--grown", grown]);
     let resources = unpacked(site, "train.fmu").join("resources");
-    Fmu::of(&PLANT, resources.to_str().unwrap())
+    Fmu::from_model(&PLANT, resources.to_str().unwrap())
 }
 
 /// The demo with a train that has been corrected, in a wind in m/s against growing chainage, as a
@@ -136,7 +136,7 @@ fn what_was_found_is_seen_in_the_forces_and_they_are_the_whole() {
 
 #[test]
 fn a_standing_train_starts_by_traction_and_what_is_not_connected_is_none() {
-    let fmu = Fmu::of(&PLANT, demo().to_str().unwrap());
+    let fmu = Fmu::from_model(&PLANT, demo().to_str().unwrap());
     set(&fmu, "position_m", MISSING);
     set(&fmu, "brake_force_n", f64::NAN);
     // Past a summit the line falls by 3.1 permille.
@@ -155,7 +155,7 @@ fn a_standing_train_starts_by_traction_and_what_is_not_connected_is_none() {
     set(&fmu, "brake_force_n", 900e3);
     assert!((12..40).map(stepped).all(|speed_mps| speed_mps >= 0.0));
     assert_eq!(real(&fmu, "motion.speed_mps"), 0.0, "a brake stops it and does not push it back");
-    let rolling = Fmu::of(&PLANT, demo().to_str().unwrap());
+    let rolling = Fmu::from_model(&PLANT, demo().to_str().unwrap());
     let held = reference_in(&PLANT, "held_at_rest");
     assert_eq!(rolling.set_boolean(held, 0), Status::Ok, "{}", rolling.said());
     set(&rolling, "initial_position_m", 2500.0);
@@ -207,7 +207,7 @@ fn what_no_train_does_is_refused_in_words() {
 
 #[test]
 fn a_point_again_a_step_back_and_a_leap_move_no_train() {
-    let fmu = Fmu::of(&PLANT, demo().to_str().unwrap());
+    let fmu = Fmu::from_model(&PLANT, demo().to_str().unwrap());
     set(&fmu, "initial_speed_mps", 10.0);
     fmu.initialize();
     for time_s in [0.0, 10.0, 20.0] {

@@ -80,11 +80,11 @@ impl Fmu {
 
     /// An instance of the estimators that were unpacked beside this folder of resources.
     pub fn new(resources: &str) -> Fmu {
-        Fmu::of(&ESTIMATORS, resources)
+        Fmu::from_model(&ESTIMATORS, resources)
     }
 
     /// An instance of a model.
-    pub fn of(model: &Interface, resources: &str) -> Fmu {
+    pub fn from_model(model: &Interface, resources: &str) -> Fmu {
         let fmu = Fmu::instantiate(CO_SIMULATION, model.guid, resources);
         assert!(!fmu.component.is_null(), "{}", fmu.said());
         fmu

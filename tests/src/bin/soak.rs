@@ -74,7 +74,7 @@ fn main() -> ExitCode {
     ExitCode::SUCCESS
 }
 
-/// Lives the months; an error says what is wrong with what was asked for.
+/// Lives the months; an error says what is wrong with the request.
 fn live(months: &Months) -> Result<(), String> {
     let stories = match months.story.as_deref().map(|name| (name, Story::from_name(name))) {
         None => Story::all(),

@@ -47,7 +47,7 @@ impl Process {
     }
 
     /// Starts a program whose streams go elsewhere.
-    fn of(mut command: Command) -> Process {
+    fn from_command(mut command: Command) -> Process {
         let child = ends_with_this(&mut command).spawn().expect("the program to start");
         Process { child, lines: Arc::default(), errors: PathBuf::new() }
     }

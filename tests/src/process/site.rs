@@ -143,7 +143,7 @@ impl DaemonSite {
     ) -> Process {
         let mut command = self.command(program, arguments);
         command.stdin(Stdio::null()).stdout(output).stderr(errors);
-        Process::of(command)
+        Process::from_command(command)
     }
 
     fn start_command(&self, command: Command) -> Process {

@@ -72,7 +72,7 @@ impl Terminal {
         }
         // SAFETY: between fork and exec only system calls are made.
         unsafe { command.pre_exec(move || bind(tie)) };
-        Process::of(command)
+        Process::from_command(command)
     }
 
     /// Returns the text shown so far.

@@ -147,7 +147,7 @@ impl Disturbances {
     }
 
     /// Returns a dataset's effects in one run of it.
-    pub fn of(
+    pub fn new(
         effects: &[TrueEffect],
         train: &TrueTrain,
         line: &SimulatedLine,

@@ -3,7 +3,7 @@
 //! From a seed it draws a train of one of four types, a line, and runs in both directions with
 //! their load, weather and driver. The truth is a train of many cars that each feel their own
 //! gradient, curve and tunnel, under jerk-limited commands and lagging actuators. Undeclared
-//! effects act on that truth, or on the sensors where they belong; what is declared, and what the
+//! effects act on that truth, or on the sensors where they belong; the declaration, and what the
 //! sensors recorded, is all that the program under test may see.
 //!
 //! # Layout
@@ -120,7 +120,7 @@ impl SimulatedDataset {
 /// When fewer than two runs, a period of sampling outside 0.1 to 1 s, or a duration below 60 s is
 /// asked for.
 pub fn simulate(settings: &SimulatorSettings) -> SimulatedDataset {
-    let world = SimulatedWorld::of(settings);
+    let world = SimulatedWorld::from_settings(settings);
     let effects = draw_effects(settings, &world.scene());
     let runs: Vec<SimulatedRun> =
         world.plans.iter().map(|plan| world.run(plan.clone(), &effects)).collect();
@@ -152,7 +152,7 @@ impl SimulatedWorld {
     /// # Panics
     ///
     /// See [`simulate`].
-    pub fn of(settings: &SimulatorSettings) -> Self {
+    pub fn from_settings(settings: &SimulatorSettings) -> Self {
         draw_world(settings)
     }
 
@@ -227,7 +227,7 @@ fn simulate_run(
     sensors: &Sensors,
 ) -> SimulatedRun {
     let stream = |stream: Stream| SimulatorRandom::new(settings.seed, stream);
-    let disturbances = Disturbances::of(effects, train, line, &plan, settings);
+    let disturbances = Disturbances::new(effects, train, line, &plan, settings);
     let physics = TruePhysics { train, line, plan: &plan, disturbances: &disturbances };
     let mut states = drive_run(&physics, settings);
     if settings.deviations.has_couplings {

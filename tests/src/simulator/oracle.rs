@@ -67,7 +67,7 @@ fn pooled_mps(errors: impl Iterator<Item = SpeedError>) -> f64 {
 fn error(recording: &OpenLoopRecording, model: &impl ForceModel, restart: Restart) -> SpeedError {
     let mut prediction = Prediction::new();
     prediction.simulate(recording, model, restart);
-    SpeedError::of(recording, &prediction)
+    SpeedError::new(recording, &prediction)
 }
 
 /// Returns a run's samples as the program under test resolves them.

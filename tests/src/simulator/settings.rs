@@ -206,7 +206,7 @@ impl SimulatorSettings {
     }
 
     /// Returns the same with ideal sensors, declared Davis coefficients that are the true ones, no
-    /// deviations and no wheel slip: what is left of an error is the effect's or the predictor's.
+    /// deviations and no wheel slip: the rest of an error is the effect's or the predictor's.
     pub fn ideal(seed: u64, effects: EffectRequest) -> Self {
         SimulatorSettings {
             sensor_noise: 0.0,

@@ -26,7 +26,7 @@ impl FisherInformation {
     /// sensor's variance; the speed at the start of each leg is unknown.
     ///
     /// The sensitivities S of the speed obey S' = ∂a/∂v S + ∂a/∂theta along the true motion.
-    pub fn of(shuttle: &Shuttle, ride: &[ShuttleMoment]) -> Self {
+    pub fn new(shuttle: &Shuttle, ride: &[ShuttleMoment]) -> Self {
         let basis = SpeedBasis::new(30.0);
         let mut total = SMatrix::zeros();
         for leg in ride.split(|instant| instant.speed_mps <= 0.0).filter(|leg| leg.len() > 1) {

@@ -50,7 +50,7 @@ pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     for (mass_kg, published) in TABLE_3 {
         let score = run(&shuttle, mass_kg, Condition::Calm, 1.0, legs);
         let what = format!("mass of {:.1} t after one leg of 3 km, newly loaded", 1e-3 * mass_kg);
-        let bound = 100.0 * FisherInformation::of(&shuttle, &calm_leg(mass_kg)).mass_std();
+        let bound = 100.0 * FisherInformation::new(&shuttle, &calm_leg(mass_kg)).mass_std();
         let (published, bound) = (Some(published), Some(bound));
         rows.push(PaperRow { published, bound, ..score.row(row(&what, legs)) });
     }
@@ -59,7 +59,7 @@ pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     let bias = score.bias(row("bias of the mass of 117.1 t: mean error with its sign", legs));
     rows.push(PaperRow { published: Some(-published), ..bias });
     let leg = calm_leg(mass_kg);
-    let biased = FisherInformation::of(&shuttle, &leg).mass_std_with_bias();
+    let biased = FisherInformation::new(&shuttle, &leg).mass_std_with_bias();
     for (condition, what, bound) in [
         (
             Condition::Wind,

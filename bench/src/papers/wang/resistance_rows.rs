@@ -30,7 +30,7 @@ pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     let shuttle = Shuttle::new(false);
     let ride = shuttle.crossing(CROSSING, &mut calm);
     let speeds = LearningSet::ALL.map(|section| driven_speeds(&shuttle, &ride, section));
-    let information = FisherInformation::of(&shuttle, &ride);
+    let information = FisherInformation::new(&shuttle, &ride);
     let scores = run(&shuttle, &ride, &speeds, seeds);
     let mut rows: Vec<PaperRow> = (0..3)
         .map(|i| {
@@ -53,7 +53,7 @@ fn curve_in_tunnel_row(seeds: Seeds) -> PaperRow {
     let ride = shuttle.crossing(CROSSING, &mut calm);
     let speeds = LearningSet::ALL.map(|section| driven_speeds(&shuttle, &ride, section));
     let curve = LearningSet::Curve as usize;
-    let bound = FisherInformation::of(&shuttle, &ride).resistance_std(curve, &speeds[curve]);
+    let bound = FisherInformation::new(&shuttle, &ride).resistance_std(curve, &speeds[curve]);
     let score = &run(&shuttle, &ride, &speeds, seeds)[curve];
     let what = format!("{}: with two curves inside tunnels", NAMES[curve]);
     PaperRow { bound: Some(bound), ..score.row(row(&what, seeds)) }
@@ -192,11 +192,12 @@ impl PrintedDescent {
 
     /// Learns from the step to a sample, the acceleration being the differentiated speed.
     fn update(&mut self, sample: &ResolvedSample) {
-        let motion = KnownMotion::of(sample).ok().filter(|now| now.speed_mps >= SPEED_MIN_MPS);
+        let motion =
+            KnownMotion::from_sample(sample).ok().filter(|now| now.speed_mps >= SPEED_MIN_MPS);
         let Some((from, to)) = std::mem::replace(&mut self.last, motion).zip(motion) else {
             return;
         };
-        let (Some(step_s), Some(section)) = (to.step_from(&from), LearningSet::of(&from, &to))
+        let (Some(step_s), Some(section)) = (to.step_from(&from), LearningSet::new(&from, &to))
         else {
             return;
         };

@@ -10,7 +10,7 @@ use dynocar_shared::{
     Status, UseState,
 };
 
-/// A number with its name and what it means.
+/// A number with its name and its meaning.
 pub struct Member {
     pub name: String,
     pub number: u32,

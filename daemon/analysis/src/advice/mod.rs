@@ -1,6 +1,6 @@
 //! Advice on the next manoeuvre: the one that narrows most of the least known quantity.
 //!
-//! Everything comes from a snapshot and what is declared of the train: the present covariance, the
+//! Everything comes from a snapshot and the declaration of the train: the present covariance, the
 //! noise behind it ([`noise`]), the manoeuvres within the train's limits ([`manoeuvre`]), and what
 //! `train_kalman` would know after each ([`rehearsal`]). What driving does not help has its
 //! remedy in words ([`remedy`]). The line is taken as level: a snapshot does not say where the train is.

@@ -59,7 +59,7 @@ pub struct DeclaredBrakeFigures {
 impl EtcsBrake {
     /// Returns the parameters, and what each rests on. The form asks for all of them, and for factors at the boundaries
     /// of the emergency steps: what is not known is replaced, and marked as a guess.
-    pub fn of(found: &BrakeParameters, choice: &DeclaredBrakeFigures) -> (Self, Vec<Basis>) {
+    pub fn new(found: &BrakeParameters, choice: &DeclaredBrakeFigures) -> (Self, Vec<Basis>) {
         let emergency = &found.emergency;
         let over = |value: f64| SpeedSteps::constant(value).between(&emergency.boundaries);
         let normal = found.normal_service.as_ref();

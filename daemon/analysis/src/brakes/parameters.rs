@@ -83,7 +83,7 @@ pub fn lower_bound(law: &DecelerationLaw, confidence: f64) -> Vec<[f64; 2]> {
 pub fn usual(stops: &[RecordedStop]) -> (Option<SpeedSteps>, usize) {
     let is_usual = |it: &&RecordedStop| it.manner == Manner::Modulated && !it.has_slid;
     let usual: Vec<RecordedStop> = stops.iter().filter(is_usual).cloned().collect();
-    let day = StopStatistics::of(&usual);
+    let day = StopStatistics::from_stops(&usual);
     let enough = day.decelerations.iter().filter(|it| it.stops >= 3);
     let curve: Vec<[f64; 2]> =
         enough.map(|it| [it.speed_mps, it.deceleration_mps2.median]).collect();

@@ -118,7 +118,7 @@ impl LeastSquares<FREE> for Fit<'_> {
 
 impl TableLaw {
     /// Returns the brake behind some rows; `None` for rows that no brake gives.
-    pub fn of(name: &str, rows: &[StoppingTableRow]) -> Option<Self> {
+    pub fn new(name: &str, rows: &[StoppingTableRow]) -> Option<Self> {
         let fastest_mps = rows.iter().map(|row| row.from_mps).fold(0.0, f64::max);
         let knots_mps = KNOTS.map(|share| share * fastest_mps);
         let mut fit = Fit { rows, knots_mps, worst: f64::INFINITY };
@@ -173,7 +173,7 @@ impl TableLaw {
 ///
 /// # Errors
 ///
-/// Names the row, and what was expected.
+/// Names the row, and the expected value.
 pub fn parse(text: &str) -> Result<Vec<(String, Vec<StoppingTableRow>)>, String> {
     let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     let head = lines.next().map(|it| it.1.trim().trim_start_matches('\u{feff}'));
@@ -279,7 +279,7 @@ mod tests {
                 distance_m,
             });
         }
-        let law = TableLaw::of("true", &rows).unwrap();
+        let law = TableLaw::new("true", &rows).unwrap();
         assert!(law.error_max < 0.01, "{law:?}");
         let lost_s = law.traction_cut_off_s + 0.5 * law.build_up_s;
         assert!((lost_s - 3.0).abs() < 0.3, "{law:?}");

@@ -53,7 +53,7 @@ struct LateSensor {
 
 impl LateSensor {
     /// Of a train that has this speed in m/s; `None` where its sensor is on time.
-    fn of(train: &TrainModel, speed_mps: f64) -> Option<Self> {
+    fn new(train: &TrainModel, speed_mps: f64) -> Option<Self> {
         let Corrections { speed_delay_s, speed_lag_s, .. } = train.corrections;
         let is_late = speed_delay_s > 0.0 || speed_lag_s > 0.0;
         is_late.then(|| {
@@ -75,7 +75,7 @@ impl DrivenTrain {
     /// Returns a train at its beginning; without a line the gradient comes with what acts.
     pub fn new(train: Arc<TrainModel>, track: Option<Arc<Track>>, beginning: Beginning) -> Self {
         let Beginning { position_m, speed_mps, is_held_at_rest } = beginning;
-        let sensor = LateSensor::of(&train, speed_mps);
+        let sensor = LateSensor::new(&train, speed_mps);
         // The train is driven by what acts now, however late its sensor shows it.
         let on_time = Corrections { speed_delay_s: 0.0, speed_lag_s: 0.0, ..train.corrections };
         let acting = TrainModel { corrections: on_time, ..TrainModel::clone(&train) };

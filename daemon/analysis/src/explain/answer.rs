@@ -275,7 +275,7 @@ pub struct VerdictWords {
 
 impl VerdictWords {
     /// Returns a verdict of one text that leaves nothing open.
-    pub fn of(text: String) -> Self {
+    pub fn from_text(text: String) -> Self {
         VerdictWords { heading: text.clone(), whole: text, left: String::new() }
     }
 }

@@ -45,7 +45,7 @@ struct Auxiliaries {
 impl Auxiliaries {
     /// Returns the power at rest of some runs and its scatter; the declared one with a wide one where they
     /// never rest.
-    fn of(powered: &[&RunData], declared: PowerTrain) -> Self {
+    fn new(powered: &[&RunData], declared: PowerTrain) -> Self {
         let rows = powered.iter().filter_map(|run| Some((run, run.power.as_ref()?)));
         let resting_kw: Vec<f64> = rows
             .flat_map(|(run, power)| run.samples().iter().zip(&power.power_w))
@@ -117,7 +117,7 @@ impl Hypothesis for OpenDrive {
             // The auxiliary power at rest limits the one while driving.
             prior: Some(&self.prior),
             // The kind that it would be taken for.
-            ..Nature::of(EffectKind::TractionGain, parameters)
+            ..Nature::new(EffectKind::TractionGain, parameters)
         }
     }
 
@@ -150,7 +150,7 @@ impl Hypothesis for OpenDrive {
 /// A drive as the runs show it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EstimatedDrive {
-    /// With what was found.
+    /// With the findings.
     pub drive: PowerTrain,
     /// The same for machines.
     pub answer: DriveAnswer,
@@ -175,7 +175,7 @@ pub fn estimated(dataset: &Dataset) -> Result<Option<EstimatedDrive>, RunDataErr
     let declared = dataset.train.drive;
     let drive = declared.unwrap_or(PowerTrain::USUAL);
     let holds_more = |run: &&RunData| run.power.as_ref().is_some_and(|it| it.has_auxiliaries);
-    let resting = powered.iter().any(holds_more).then(|| Auxiliaries::of(&powered, drive));
+    let resting = powered.iter().any(holds_more).then(|| Auxiliaries::new(&powered, drive));
     let open = OpenDrive::new(drive, resting);
     let problem = FitProblem::new(runs, dataset.train.resistance);
     Ok(reported_by(&problem, open, declared))

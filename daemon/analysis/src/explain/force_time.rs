@@ -31,10 +31,10 @@ struct LateStamps;
 
 impl Hypothesis for LateStamps {
     fn nature(&self) -> Nature<'_> {
-        Nature::of(EffectKind::ActuatorDelay, &PARAMETERS)
+        Nature::new(EffectKind::ActuatorDelay, &PARAMETERS)
     }
 
-    /// Nothing acts before it: what it finds around a sample is what is declared.
+    /// Nothing acts before it: what it finds around a sample is the declaration.
     fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
         let (late_s, time_s) = (parameters[0], run.recording.time_s());
         for (i, force) in (first..).zip(forces) {

@@ -26,7 +26,7 @@ pub struct HeldOutRun {
 
 impl HeldOutRun {
     /// Reduces a run; `within` is the part of it that may show effects.
-    pub fn of(
+    pub fn new(
         (problem, outcome): (&FitProblem, &SearchOutcome),
         run: &RunData,
         within: Option<&RunData>,
@@ -35,7 +35,7 @@ impl HeldOutRun {
         let fit = beside.as_ref().map_or(&outcome.fit, |beside| &beside.fit);
         let within = within.filter(|_| !outcome.fit.model.effects.is_empty());
         HeldOutRun {
-            score: RunScore::of(run, &outcome.base, &outcome.fit),
+            score: RunScore::new(run, &outcome.base, &outcome.fit),
             evidence: within.map(|run| (problem.normal_of(run, fit), vec![RunPositions::of(run)])),
         }
     }

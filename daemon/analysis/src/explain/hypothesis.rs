@@ -33,7 +33,7 @@ impl ReportedValues {
     }
 }
 
-/// A parameter at a bound of what is looked for.
+/// A parameter at a bound of the quantity looked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AtBound {
     /// Its name in the answer.
@@ -202,7 +202,7 @@ pub struct Nature<'h> {
 
 impl<'h> Nature<'h> {
     /// Of a kind with these parameters, none of which does anything unusual.
-    pub const fn of(kind: EffectKind, parameters: &'h [Parameter]) -> Self {
+    pub const fn new(kind: EffectKind, parameters: &'h [Parameter]) -> Self {
         Nature {
             kind,
             parameters,
@@ -352,7 +352,7 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         None
     }
 
-    /// Returns the first parameter that lies at a bound of what is looked for, other than at no effect: the
+    /// Returns the first parameter that lies at a bound of the quantity looked for, other than at no effect: the
     /// data ask for something else, or hold it not at all.
     fn at_bound(&self, parameters: &[f64]) -> Option<AtBound> {
         let mut specs = self.parameters().iter().zip(parameters);

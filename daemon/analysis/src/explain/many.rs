@@ -234,7 +234,7 @@ impl<E: From<RunDataError> + Send> Many<'_, E> {
     ) -> Result<Vec<HeldOutRun>, E> {
         let problem = search.problem;
         if !is_common(&outcome.fit) {
-            let judged = |run: &RunData| HeldOutRun::of((problem, outcome), run, Some(run));
+            let judged = |run: &RunData| HeldOutRun::new((problem, outcome), run, Some(run));
             return Ok(parallel::of_each(search.holdout, judged));
         }
         let roles = self.dataset.runs.iter().map(|run| run.role).enumerate();
@@ -243,7 +243,7 @@ impl<E: From<RunDataError> + Send> Many<'_, E> {
             let read = (self.read)(*index)?;
             let within = self.within(problem, read.clone(), preparation)?;
             let run = preparation.run(read, Density::Recorded)?;
-            Ok(HeldOutRun::of((problem, outcome), &run, within.as_ref()))
+            Ok(HeldOutRun::new((problem, outcome), &run, within.as_ref()))
         };
         // Their evidence adds up in groups, so that memory does not grow with their number.
         let of_group = own.len().div_ceil(FIT_RUNS_HELD[1]).max(1);

@@ -10,10 +10,10 @@ use crate::statistics::rms;
 
 impl EffectMeaning {
     /// Returns that of one effect of a fitted model; `rest` is the model refitted without it.
-    pub fn of(problem: &FitProblem, fit: &Fit, index: usize, rest: &Fit) -> Self {
+    pub fn new(problem: &FitProblem, fit: &Fit, index: usize, rest: &Fit) -> Self {
         let (mut effect_j, mut traction_j, mut distance_m) = (0.0, 0.0, 0.0);
         for run in &problem.runs {
-            let work = Work::of(run, fit, index);
+            let work = Work::new(run, fit, index);
             effect_j += work.effect_j;
             traction_j += work.traction_j;
             distance_m += work.distance_m;
@@ -38,7 +38,7 @@ struct Work {
 
 impl Work {
     /// By the forces with everything that was fitted, and with everything but one effect.
-    fn of(run: &RunData, fit: &Fit, index: usize) -> Self {
+    fn new(run: &RunData, fit: &Fit, index: usize) -> Self {
         let (mut with, mut without) = (UpdatedForces::default(), UpdatedForces::default());
         fit.model.forces(run, &fit.theta, &mut with);
         let (others, theta) = fit.model.without(&fit.theta, index);

@@ -117,7 +117,7 @@ fn explained<E: From<RunDataError> + Send>(
 ) -> Result<Explanation, E> {
     progress(0.0, "reading the runs");
     let density = if many.is_some() { Density::Thinned } else { Density::Recorded };
-    let Prepared { forces, preparation, runs } = Prepared::of(&dataset, density)?;
+    let Prepared { forces, preparation, runs } = Prepared::new(&dataset, density)?;
     let track = preparation.track().map(|track| &**track);
     let all = many.as_ref().map_or(&dataset.runs, |many| &many.dataset.runs);
     let diagnostics = diagnostics(preparation.train(), track, all);
@@ -137,7 +137,7 @@ fn explained<E: From<RunDataError> + Send>(
     let is_possible =
         diagnostics.iter().all(|diagnostic| diagnostic.severity < Severity::Fundamental);
     let mut outcome = if is_possible { search.run() } else { search.base() };
-    if is_possible && Unexplained::of(&search, &outcome).is_some_and(|left| !left.is_noise()) {
+    if is_possible && Unexplained::new(&search, &outcome).is_some_and(|left| !left.is_noise()) {
         search.look_under_noise(&mut outcome);
     }
     let known = places::settle(&problem, &mut outcome.fit);
@@ -152,7 +152,7 @@ fn explained<E: From<RunDataError> + Send>(
     progress(0.95, "scoring the holdout runs");
     let judged = judged(many.as_ref(), &search, &preparation, &outcome)?;
     let scores = judged.iter().map(|run| run.score.clone()).collect();
-    let score = PredictionScore::of(&problem, scores, &outcome.base, &outcome.fit);
+    let score = PredictionScore::new(&problem, scores, &outcome.base, &outcome.fit);
     let spans = match &many {
         Some(many) => many.spans(),
         None => problem.runs.iter().map(|run| [run.file.clone(), run.file.clone()]).collect(),
@@ -188,7 +188,7 @@ fn judged<E: From<RunDataError> + Send>(
     preparation: &Preparation,
     outcome: &SearchOutcome,
 ) -> Result<Vec<HeldOutRun>, E> {
-    let of = |run: &RunData| HeldOutRun::of((search.problem, outcome), run, Some(run));
+    let of = |run: &RunData| HeldOutRun::new((search.problem, outcome), run, Some(run));
     match many {
         Some(many) => many.judged(search, preparation, outcome),
         None => Ok(parallel::of_each(search.holdout, of)),
@@ -223,7 +223,7 @@ struct Prepared {
 }
 
 impl Prepared {
-    fn of(dataset: &Dataset, density: Density) -> Result<Self, RunDataError> {
+    fn new(dataset: &Dataset, density: Density) -> Result<Self, RunDataError> {
         let estimated_drive = drive_efficiency::estimated(dataset)?;
         let (declared, drive) = (dataset, estimated_drive.as_ref().map(|it| it.drive));
         let retaken = drive.map(|drive| dataset.with_drive(drive));

@@ -164,7 +164,7 @@ impl<'a> Scan<'a> {
         tuple
     }
 
-    /// Decrease of the cost when an effect acts, by what it changes at a sample in m/s²: from what is declared
+    /// Decrease of the cost when an effect acts, by what it changes at a sample in m/s²: from the declaration
     /// to what acts. Some of many runs stand for all: it chooses where a fit starts.
     pub fn decrease_by(
         &self,

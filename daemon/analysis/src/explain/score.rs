@@ -36,7 +36,7 @@ pub struct RunScore {
 
 impl RunScore {
     /// Of a run by the models without and with the effects.
-    pub fn of(run: &RunData, before: &Fit, after: &Fit) -> Self {
+    pub fn new(run: &RunData, before: &Fit, after: &Fit) -> Self {
         let both = |restart| [before, after].map(|fit| run_error(fit, run, restart));
         RunScore {
             full: both(Restart::FullRun),
@@ -72,7 +72,7 @@ fn errors_at<const N: usize>(
     fit.model.forces_on_day(run, theta, own, &mut forces);
     let each = ways.each_mut().map(|(prediction, restart)| (prediction, *restart));
     Prediction::simulate_beside(&run.recording, &forces, each);
-    ways.map(|(prediction, _)| SpeedError::of(&run.recording, &prediction))
+    ways.map(|(prediction, _)| SpeedError::new(&run.recording, &prediction))
 }
 
 /// Returns the errors of recorded runs from stop to stop, by the models without and with the effects; `None`
@@ -107,7 +107,7 @@ pub struct FitErrors {
 
 impl FitErrors {
     /// Returns those of a fitted model.
-    pub fn of(problem: &FitProblem, fit: &Fit) -> Self {
+    pub fn new(problem: &FitProblem, fit: &Fit) -> Self {
         let speed_mps = fit.open_loop_mps(|| open_loop_mps(problem, fit));
         let missed =
             |(ratio, deviation): (f64, f64)| (ratio - 1.0 / fit.speed_scale()).hypot(deviation);
@@ -164,7 +164,7 @@ fn open_loop_mps(problem: &FitProblem, fit: &Fit) -> [[f64; 3]; 2] {
 
 /// Returns the share of the open-loop error of the fit runs that the larger model takes away.
 pub fn reduction(problem: &FitProblem, smaller: &Fit, larger: &Fit) -> f64 {
-    FitErrors::of(problem, larger).reduction_from(&FitErrors::of(problem, smaller))
+    FitErrors::new(problem, larger).reduction_from(&FitErrors::new(problem, smaller))
 }
 
 /// Errors without and with the effects over some parts together, in m/s, and what is taken away.
@@ -178,7 +178,7 @@ pub fn pooled(parts: impl Iterator<Item = [SpeedError; 2]>) -> Option<[f64; 3]> 
 impl PredictionScore {
     /// Returns the scores of the holdout runs with the errors of the models without and with the effects on the fit
     /// runs.
-    pub fn of(problem: &FitProblem, holdout: Vec<RunScore>, before: &Fit, after: &Fit) -> Self {
+    pub fn new(problem: &FitProblem, holdout: Vec<RunScore>, before: &Fit, after: &Fit) -> Self {
         let summed = |parts: &mut dyn Iterator<Item = [SpeedError; 2]>| {
             let add =
                 |sum: [SpeedError; 2], own: [SpeedError; 2]| [sum[0] + own[0], sum[1] + own[1]];
@@ -220,7 +220,7 @@ impl PredictionScore {
         self.intervals().map(|it| it[2])
     }
 
-    /// 95 % intervals of the errors over whole runs in m/s, before and after, and of what is taken
+    /// 95 % intervals of the errors over whole runs in m/s, before and after, and of the taken values
     /// away.
     fn intervals(&self) -> Option<[[f64; 2]; 3]> {
         intervals_95(&self.holdout_runs, |drawn| {

@@ -27,7 +27,7 @@ pub struct Unexplained {
 
 impl Unexplained {
     /// Returns the residual of a finished search; `None` without motion.
-    pub fn of(search: &Search, outcome: &SearchOutcome) -> Option<Self> {
+    pub fn new(search: &Search, outcome: &SearchOutcome) -> Option<Self> {
         let (n_per_kn, share) = search.problem.noise_n_per_kn(outcome.fit.noise, OVER_S)?;
         let last = outcome.rounds.last().into_iter().flat_map(|round| round.iter());
         let tried = last.clone().filter_map(|trial| Some((trial.kind, Search::refusal(trial)?)));

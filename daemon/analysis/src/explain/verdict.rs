@@ -48,7 +48,7 @@ pub fn answer(
     // An effect without a name has no competing hypotheses either.
     let is_unknown = fit.model.has(EffectKind::Unknown);
     let competing = if is_unknown { Vec::new() } else { competing_hypotheses(outcome) };
-    let left = Unexplained::of(search, outcome);
+    let left = Unexplained::new(search, outcome);
     let verdict = verdict(search, outcome, &competing, left.as_ref());
     let is_enough = verdict != Verdict::InsufficientData;
     let identifiability = if is_enough { identifiability(search, outcome) } else { Vec::new() };
@@ -98,7 +98,7 @@ pub fn answer(
     }
 }
 
-/// The verdict in words, and what to do.
+/// The verdict in words, and the recommended action.
 type Words = (VerdictWords, Option<String>);
 
 /// Returns the words where the data cannot be true.
@@ -107,7 +107,7 @@ fn impossible(diagnostics: &[DatasetDiagnostic]) -> Option<Words> {
     let faults: Vec<String> = fundamental.map(ToString::to_string).collect();
     let words = || format!("The data cannot be true as described: {}", faults.join("; "));
     let to_do = "Set right what is named and run this again.";
-    (!faults.is_empty()).then(|| (VerdictWords::of(words()), Some(to_do.into())))
+    (!faults.is_empty()).then(|| (VerdictWords::from_text(words()), Some(to_do.into())))
 }
 
 /// Returns why nothing was scored, and what is known instead; `None` when something was.
@@ -182,7 +182,7 @@ fn effect_answers(
                 std: reported.deviations,
                 p_value: p_value(score),
                 error_reduction: reduction,
-                meaning: EffectMeaning::of(search.problem, fit, index, &rest),
+                meaning: EffectMeaning::new(search.problem, fit, index, &rest),
                 contradiction: apart
                     .filter(|_| effect.nature().changes_speed_scale)
                     .map(|sources| sources.sentence()),
@@ -285,7 +285,7 @@ fn considered(outcome: &SearchOutcome, competing: &[CompetingHypotheses]) -> Vec
     list
 }
 
-/// Returns the verdict in words, and what to do.
+/// Returns the verdict in words, and the recommended action.
 fn worded(
     search: &Search,
     outcome: &SearchOutcome,
@@ -300,7 +300,7 @@ fn worded(
             let held_out = search.holdout.len();
             let text = format!("No run is there to fit: all {held_out} are held out.");
             return (
-                VerdictWords::of(text),
+                VerdictWords::from_text(text),
                 Some("Give some of the runs the role \"fit\".".into()),
             );
         }
@@ -311,7 +311,7 @@ fn worded(
                 "The fit runs hold {moving_s:.0} s of usable motion ({observations} observations): too little to explain."
             );
             let experiment = "Record several runs of some minutes, in both directions.";
-            return (VerdictWords::of(text), Some(experiment.into()));
+            return (VerdictWords::from_text(text), Some(experiment.into()));
         }
         Verdict::None => {
             let small: Vec<String> = outcome.small_trials().map(|it| small(outcome, it)).collect();

@@ -171,7 +171,7 @@ pub struct Imported {
 /// # Errors
 ///
 /// Where a file is of no known format or breaks the rules of its own; with file, line, the path to the
-/// value and what was expected.
+/// value and the expected value.
 pub fn import(
     sources: &[ImportSource],
     forced: Option<Format>,

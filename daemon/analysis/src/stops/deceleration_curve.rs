@@ -65,7 +65,7 @@ pub struct DecelerationCurve {
 
 impl DecelerationCurve {
     /// Returns the curve of a stop's samples; `None` for too few.
-    pub fn of(samples: &[TrainSample]) -> Option<Self> {
+    pub fn from_samples(samples: &[TrainSample]) -> Option<Self> {
         let mut points = smoothed(samples)?;
         let built_up = built_up(&points);
         if let Some(from) = built_up

@@ -42,7 +42,7 @@ pub struct MeasuredResponse {
 
 impl MeasuredResponse {
     /// Returns that of some stops, each by the time it loses and the moment of that loss, as a ramp has them.
-    fn of(built: &[(&DecelerationCurve, &DecelerationPoint)]) -> Self {
+    fn from_points(built: &[(&DecelerationCurve, &DecelerationPoint)]) -> Self {
         let count = built.len() as f64;
         let losses: Vec<[f64; 2]> = built.iter().map(|(curve, from)| lost(curve, from)).collect();
         let mean = |k: usize| losses.iter().map(|it| it[k]).sum::<f64>() / count;
@@ -126,7 +126,7 @@ pub struct Gradient {
 impl DecelerationLaw {
     /// Returns the law of some stops, where stops are assumed to repeat within a relative standard
     /// deviation until there are enough to estimate it; `None` without a stop whose brake builds up.
-    pub fn of(curves: &[DecelerationCurve], assumed_repeatability: f64) -> Option<Self> {
+    pub fn new(curves: &[DecelerationCurve], assumed_repeatability: f64) -> Option<Self> {
         let built: Vec<(&DecelerationCurve, &DecelerationPoint)> = curves
             .iter()
             .filter_map(|curve| Some((curve, &curve.points[curve.built_up?])))
@@ -171,7 +171,7 @@ impl DecelerationLaw {
             let next = own * (1.0 + 1.0 / point.stops as f64).sqrt();
             point.next_std_mps2 = next.hypot(point.std_mps2);
         }
-        let response = MeasuredResponse::of(&built);
+        let response = MeasuredResponse::from_points(&built);
         Some(DecelerationLaw {
             points,
             response,

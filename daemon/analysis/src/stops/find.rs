@@ -264,7 +264,7 @@ pub struct CutOff {
 
 impl CutOff {
     /// Returns that of some times; `None` without one.
-    pub fn of(times_s: impl Iterator<Item = f64> + Clone) -> Option<Self> {
+    pub fn from_times(times_s: impl Iterator<Item = f64> + Clone) -> Option<Self> {
         let [least_s, greatest_s] = span(times_s.clone())?;
         Some(CutOff { stops: times_s.count(), least_s, greatest_s })
     }

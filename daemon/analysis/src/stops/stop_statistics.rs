@@ -26,7 +26,7 @@ pub struct QuantileRange {
 }
 
 impl QuantileRange {
-    fn of(values: &[f64]) -> Option<Self> {
+    fn from_values(values: &[f64]) -> Option<Self> {
         let mut sorted = values.to_vec();
         sorted.sort_unstable_by(f64::total_cmp);
         let last = sorted.len().checked_sub(1)?;
@@ -74,7 +74,7 @@ pub struct StopStatistics {
 
 impl StopStatistics {
     /// Sums some stops up.
-    pub fn of(stops: &[RecordedStop]) -> Self {
+    pub fn from_stops(stops: &[RecordedStop]) -> Self {
         let ends_mps = span(stops.iter().map(|it| it.from_mps)).unwrap_or([0.0; 2]);
         let from_speeds = (0..).map(|step| f64::from(step) * STEP_MPS);
         let from_speeds = from_speeds.take_while(|it| *it <= ends_mps[1]).filter_map(|from_mps| {
@@ -82,7 +82,7 @@ impl StopStatistics {
             let within: Vec<&RecordedStop> =
                 stops.iter().filter(|it| (bounds[0]..bounds[1]).contains(&it.from_mps)).collect();
             let spread = |of: fn(&RecordedStop) -> f64| {
-                QuantileRange::of(&within.iter().map(|it| of(it)).collect::<Vec<f64>>())
+                QuantileRange::from_values(&within.iter().map(|it| of(it)).collect::<Vec<f64>>())
             };
             Some(FromSpeed {
                 from_mps: bounds,
@@ -99,14 +99,14 @@ impl StopStatistics {
                 Some(point.deceleration_mps2)
             });
             let values: Vec<f64> = at.collect();
-            let deceleration_mps2 = QuantileRange::of(&values)?;
+            let deceleration_mps2 = QuantileRange::from_values(&values)?;
             Some(DecelerationSpread { speed_mps, stops: values.len(), deceleration_mps2 })
         });
         let dwells: Vec<f64> = stops.iter().filter_map(|it| it.dwell_s).collect();
         StopStatistics {
             from_speeds: from_speeds.collect(),
             decelerations: decelerations.collect(),
-            dwell_s: QuantileRange::of(&dwells),
+            dwell_s: QuantileRange::from_values(&dwells),
         }
     }
 }

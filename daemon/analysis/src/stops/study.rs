@@ -41,7 +41,7 @@ pub struct Study {
 impl Study {
     /// Studies the stops of a dataset; predicts the next one from some speeds in m/s, or from
     /// steps of 5 m/s and the fastest when there are none.
-    pub fn of(dataset: &Dataset, settings: &StudySettings, from_mps: &[f64]) -> Self {
+    pub fn new(dataset: &Dataset, settings: &StudySettings, from_mps: &[f64]) -> Self {
         Study::of_all(std::slice::from_ref(dataset), settings, from_mps)
     }
 
@@ -55,7 +55,7 @@ impl Study {
         let is = |stop: &RecordedStop, role| stop.role == role && stop.manner == Manner::Full;
         let of_law = stops.iter().zip(curves).filter(|(stop, _)| is(stop, Role::Fit));
         let of_law: Vec<DecelerationCurve> = of_law.map(|(_, curve)| curve).collect();
-        let law = DecelerationLaw::of(&of_law, settings.repeatability);
+        let law = DecelerationLaw::new(&of_law, settings.repeatability);
         let speeds = match (&law, from_mps) {
             (Some(law), []) => {
                 let fastest = law.fastest_mps();
@@ -75,7 +75,7 @@ impl Study {
             stop.predicted = predict(stop.from_mps, stop.gradient_permille.unwrap_or(0.0));
         }
         let cannot_tell = cannot_tell(datasets, &stops, law.as_ref());
-        let day = StopStatistics::of(&stops);
+        let day = StopStatistics::from_stops(&stops);
         Study { stops, distances, day, cannot_tell, law }
     }
 }
@@ -93,7 +93,8 @@ fn found_in(
     }
     let studied = stops.into_iter().filter_map(|stop| {
         let end = *stop.samples.end();
-        let full = stop.full_from.and_then(|from| DecelerationCurve::of(&all[from..=end]));
+        let full =
+            stop.full_from.and_then(|from| DecelerationCurve::from_samples(&all[from..=end]));
         let has_slid = all[stop.samples.clone()].iter().any(|it| it.flags & FLAG_WHEEL_SLIDE != 0);
         let no_law = match has_slid {
             true => Some("the wheels slid: their speed is not the train's".into()),
@@ -104,7 +105,7 @@ fn found_in(
             .flatten();
         let (from, mut curve) = match (full, stop.full_from, &no_law) {
             (Some(curve), Some(from), None) => (from, curve),
-            _ => (*stop.samples.start(), DecelerationCurve::of(&all[stop.samples])?),
+            _ => (*stop.samples.start(), DecelerationCurve::from_samples(&all[stop.samples])?),
         };
         let samples = &all[from..=end];
         let is_full = no_law.is_none();

@@ -123,7 +123,7 @@ fn smoothed(
             let Some((target, passes)) = targets[node] else { continue };
             let new_share = 1.0 - kept_share * kept_share;
             let variance = (FIX_STD_M * FIX_STD_M * new_share + FIX_WHITE_M * FIX_WHITE_M) / passes;
-            // The error is compared with what is left of the one before.
+            // The error is compared with the rest of the one before.
             match node.checked_sub(1).and_then(|before| targets[before]) {
                 Some((last, _)) => {
                     matrix.add_row(&[(node - 1, -kept_share), (node, 1.0)], 1.0 / variance);

@@ -62,7 +62,7 @@ pub struct SurveyRecording<'r> {
 
 impl<'r> SurveyRecording<'r> {
     /// Integrates the speed and projects the fixes.
-    pub fn of(raw: &'r RawRecording, plane: &LocalPlane) -> Self {
+    pub fn new(raw: &'r RawRecording, plane: &LocalPlane) -> Self {
         let mut travelled_m = Vec::with_capacity(raw.time_s.len());
         let (mut travelled, mut last) = (0.0, None);
         for (&time_s, &speed_mps) in raw.time_s.iter().zip(&raw.speed_mps) {

@@ -115,7 +115,7 @@ pub fn survey(
         None => plane_of(raws).ok_or(SurveyError::NoPositions)?,
     };
     let recordings =
-        parallel::of_each_number(raws.len(), |number| SurveyRecording::of(&raws[number], &plane));
+        parallel::of_each_number(raws.len(), |number| SurveyRecording::new(&raws[number], &plane));
     let cut = parallel::of_each_number(recordings.len(), |number| {
         recording_parts(number, &recordings[number])
     });

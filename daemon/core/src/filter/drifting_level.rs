@@ -133,7 +133,7 @@ impl<const N: usize> DriftingLevel<N> {
 
     /// Absorbs `value = level + parameters · theta + e`, the variance of e being 1 / `weight`.
     ///
-    /// `row` is 1 at the level, 0 at the bias. By Givens rotations; what is left of the value
+    /// `row` is 1 at the level, 0 at the bias. By Givens rotations; the rest of the value
     /// after them is the normalised innovation.
     ///
     /// # Real-time

@@ -16,7 +16,7 @@ impl<const N: usize> CovarianceFactor<N> {
     }
 
     /// Returns the factor of a covariance; `None` when it is not positive definite.
-    pub fn of(covariance: &SMatrix<f64, N, N>) -> Option<Self> {
+    pub fn from_covariance(covariance: &SMatrix<f64, N, N>) -> Option<Self> {
         Some(CovarianceFactor(covariance.cholesky()?.unpack()))
     }
 
@@ -86,7 +86,7 @@ mod tests {
     fn an_update_is_the_kalman_filters() {
         let prior = example();
         let noise = 0.5;
-        let mut factor = CovarianceFactor::of(&prior).unwrap();
+        let mut factor = CovarianceFactor::from_covariance(&prior).unwrap();
         let found = factor.measure_last(noise);
         let variance = prior[(2, 2)] + noise;
         let gain = prior.column(2) / variance;
@@ -98,7 +98,7 @@ mod tests {
 
     #[test]
     fn an_almost_exact_measurement_leaves_a_positive_covariance() {
-        let mut factor = CovarianceFactor::of(&(example() * 1e12)).unwrap();
+        let mut factor = CovarianceFactor::from_covariance(&(example() * 1e12)).unwrap();
         for _ in 0..50 {
             factor.measure_last(1e-24);
         }
@@ -108,6 +108,6 @@ mod tests {
 
     #[test]
     fn a_factor_of_no_covariance_is_refused() {
-        assert_eq!(CovarianceFactor::of(&-Matrix3::<f64>::identity()), None);
+        assert_eq!(CovarianceFactor::from_covariance(&-Matrix3::<f64>::identity()), None);
     }
 }

@@ -109,7 +109,7 @@ impl<const N: usize> TriangularSystem<N> {
         }
     }
 
-    /// Takes in one more row by Givens rotations, and gives what is left of its residual.
+    /// Takes in one more row by Givens rotations, and gives the rest of its residual.
     ///
     /// # Real-time
     ///

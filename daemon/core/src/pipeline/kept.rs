@@ -108,7 +108,7 @@ impl KeptEstimate {
     /// # Errors
     ///
     /// Why it is not.
-    pub fn of(snapshot: &ParameterSnapshot) -> Result<Self, NotKept> {
+    pub fn from_snapshot(snapshot: &ParameterSnapshot) -> Result<Self, NotKept> {
         if snapshot.status() != Status::Estimated {
             return Err(NotKept::Status(snapshot.status()));
         }
@@ -238,31 +238,31 @@ mod tests {
 
     #[test]
     fn only_a_validated_estimate_is_kept() {
-        assert!(KeptEstimate::of(&snapshot()).is_ok());
+        assert!(KeptEstimate::from_snapshot(&snapshot()).is_ok());
         for status in [Status::Unestimated, Status::Degraded, Status::Invalid] {
             let mut other = snapshot();
             other.status = status as u32;
-            assert_eq!(KeptEstimate::of(&other), Err(NotKept::Status(status)));
+            assert_eq!(KeptEstimate::from_snapshot(&other), Err(NotKept::Status(status)));
         }
         let mut coloured = snapshot();
         coloured.innovation_correlation = 0.6;
-        assert!(matches!(KeptEstimate::of(&coloured), Err(NotKept::NotWhite { .. })));
+        assert!(matches!(KeptEstimate::from_snapshot(&coloured), Err(NotKept::NotWhite { .. })));
         coloured.innovation_correlation = f64::NAN;
-        assert!(matches!(KeptEstimate::of(&coloured), Err(NotKept::NotWhite { .. })));
+        assert!(matches!(KeptEstimate::from_snapshot(&coloured), Err(NotKept::NotWhite { .. })));
         let mut large = snapshot();
         large.innovation_mean_square = 3.0;
-        assert!(matches!(KeptEstimate::of(&large), Err(NotKept::NotWhite { .. })));
+        assert!(matches!(KeptEstimate::from_snapshot(&large), Err(NotKept::NotWhite { .. })));
         let mut unsound = snapshot();
         unsound.covariance[2] = 1e-10;
-        assert_eq!(KeptEstimate::of(&unsound), Err(NotKept::NotSound));
+        assert_eq!(KeptEstimate::from_snapshot(&unsound), Err(NotKept::NotSound));
         let mut unknown = snapshot();
         unknown.parameters[1] = 999;
-        assert_eq!(KeptEstimate::of(&unknown), Err(NotKept::Parameters));
+        assert_eq!(KeptEstimate::from_snapshot(&unknown), Err(NotKept::Parameters));
     }
 
     #[test]
     fn moments_come_in_the_order_asked_for_and_only_together() {
-        let kept = KeptEstimate::of(&snapshot()).unwrap();
+        let kept = KeptEstimate::from_snapshot(&snapshot()).unwrap();
         let (mean, covariance) = kept.moments([Parameter::DavisC, Parameter::DavisA]).unwrap();
         assert_eq!((mean[0], mean[1]), (1e-3, 2.0));
         assert_eq!((covariance[(0, 0)], covariance[(0, 1)]), (1e-8, -1e-5));
@@ -274,7 +274,7 @@ mod tests {
         let mut it = snapshot();
         let second_ns = 1_000_000_000;
         it.sample_time_ns = 100 * second_ns;
-        let kept = KeptEstimate::of(&it).unwrap();
+        let kept = KeptEstimate::from_snapshot(&it).unwrap();
         assert_eq!(kept.after(2.0).use_before.interrupted_s(103 * second_ns), Some(3.0));
         assert_eq!(kept.after(7.0).use_before.interrupted_s(103 * second_ns), Some(7.0));
         assert_eq!(kept.after(2.0).use_before.interrupted_s(99 * second_ns), None, "another clock");
@@ -285,7 +285,7 @@ mod tests {
 
     #[test]
     fn variances_grow_with_time_towards_a_bound_and_never_shrink() {
-        let kept = KeptEstimate::of(&snapshot()).unwrap();
+        let kept = KeptEstimate::from_snapshot(&snapshot()).unwrap();
         assert_eq!(kept.after(0.0), kept);
         let set_back = kept.after(-5.0);
         assert_eq!(set_back.covariance(), kept.covariance(), "a clock set back ages nothing");

@@ -122,7 +122,7 @@ impl InputFault {
     }
 
     /// Returns how well two units of the quantity explain a factor of reported over true: the logarithm of
-    /// what is left, for the nearest two; `None` where none is near.
+    /// the rest, for the nearest two; `None` where none is near.
     pub fn misfit(self, factor: f64) -> Option<f64> {
         let pairs = Unit::usual_of(self.dimension()).flat_map(|of| {
             Unit::usual_of(self.dimension()).map(move |read_as| read_as.in_terms_of(&of))

@@ -124,7 +124,7 @@ impl OpenLoop {
         let forces = QuadraticForces::declared(&recording, self.train.resistance);
         self.prediction.simulate(&recording, &forces, Restart::FullRun);
         WindowError {
-            speed: SpeedError::of(&recording, &self.prediction),
+            speed: SpeedError::new(&recording, &self.prediction),
             distance_error_mps: distance_error_mps(&recording, self.prediction.speed_mps())
                 .unwrap_or(0.0),
         }

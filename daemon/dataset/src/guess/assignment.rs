@@ -51,7 +51,7 @@ pub struct Assignment<'c> {
 }
 
 impl<'c> Assignment<'c> {
-    /// Takes what is declared for granted, and for every other quantity the column that most speaks for.
+    /// Takes the declaration for granted, and for every other quantity the column that most speaks for.
     ///
     /// # Errors
     ///

@@ -7,7 +7,7 @@ use dynocar_shared::SampleField;
 use super::facts::Facts;
 use super::name::{Name, named_unit};
 use super::plausible::{UnitChoice, choose_unit};
-use crate::dataset_diagnostic::{Diagnostic, concerned};
+use crate::diagnostic::{Diagnostic, concerned};
 use crate::{GradientSource, PositionSource, Quantity, Run, TextLayout, TimeFormat};
 
 /// A recording's file.
@@ -81,7 +81,7 @@ pub struct Unmapped {
     pub reason: String,
 }
 
-/// A file and what it holds.
+/// A file and its contents.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GuessedRun {
     /// Rows of values.

@@ -61,7 +61,7 @@ pub fn named_unit(name: &Name, quantity: Quantity) -> Option<Unit> {
     readings(name, quantity).into_iter().rev().find_map(|(_, unit)| unit)
 }
 
-/// Returns the words of a name and, for each way to see a unit in its last words, what is left of them.
+/// Returns the words of a name and, for each way to see a unit in its last words, the rest of them.
 pub fn readings(name: &Name, quantity: Quantity) -> Vec<(&[String], Option<Unit>)> {
     let words = &name.words[..];
     let mut readings = vec![(words, None)];

@@ -344,7 +344,7 @@ impl Estimator for ResistanceKalman {
 
     fn update(&mut self, sample: &ResolvedSample) -> Outcome {
         let outcome = self.least_squares.update(sample);
-        let now = match (outcome, UnitSample::of(sample)) {
+        let now = match (outcome, UnitSample::from_sample(sample)) {
             (Outcome::Rejected(RejectionReason::Outlier), Ok(now)) => {
                 // A single spike is left out; after a row that does not fit, the speed is anew.
                 if self.least_squares.has_refused_row() {

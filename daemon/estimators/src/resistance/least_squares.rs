@@ -275,7 +275,8 @@ impl Estimator for ResistanceLeastSquares {
     fn update(&mut self, sample: &ResolvedSample) -> Outcome {
         self.weight_kn = sample.weight_kn;
         self.jump_n_per_kn = None;
-        let observed = UnitSample::of(sample).and_then(|now| self.source.push(&now, &self.known));
+        let observed =
+            UnitSample::from_sample(sample).and_then(|now| self.source.push(&now, &self.known));
         match observed {
             Ok(observation) => {
                 self.obstacle = None;

@@ -176,7 +176,7 @@ impl BiasBank {
         speed_mps: f64,
         noise_variance: f64,
     ) -> Result<Trust, NotPositiveDefinite> {
-        let mut judged = [Trust::of(0.0); MODELS];
+        let mut judged = [Trust::from_normalised(0.0); MODELS];
         for (judged, (behaviour, weight)) in judged.iter_mut().zip(self.behaviours.weighed_mut()) {
             let Behaviour { filter, outliers, .. } = behaviour;
             let (innovation, trust) = outliers.correct(filter, SPEED, speed_mps, noise_variance)?;

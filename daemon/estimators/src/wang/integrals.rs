@@ -7,7 +7,7 @@
 //! ```
 //!
 //! where `known` is the gradient and every declared resistance beyond the basic one, so that z2
-//! and z3 are what curves and tunnels add to what is declared of them.
+//! and z3 are what curves and tunnels add to the declaration of them.
 //!
 //! Wang 2022 fits eq. (11)-(18) to a differentiated speed, whose noise at 5 Hz is five hundred
 //! times the acceleration that 0.02 N/kN makes. The integrals hold the same equation with the
@@ -51,7 +51,7 @@ impl Regressors {
     pub fn new(train: &TrainModel, reference_radius_m: f64) -> Self {
         Regressors {
             basis: SpeedBasis::new(train.speed_max_mps().filter(|&v| v > 5.0).unwrap_or(40.0)),
-            inertia: Inertia::of(train),
+            inertia: Inertia::from_train(train),
             reference_radius_m,
         }
     }

@@ -100,7 +100,7 @@ impl JointLeastSquares {
             generation: 0,
         })
     }
-    /// z1, z2 and z3, the latter two beyond what is declared; `None` when the regression is not sound.
+    /// z1, z2 and z3, the latter two beyond the declaration; `None` when the regression is not sound.
     pub fn resistance(&self) -> Option<LineResistance> {
         let solution = self.bank.likeliest().regression.solve()?;
         let [basic, curve, tunnel] = LearningSet::ALL.map(|section| self.davis(&solution, section));
@@ -182,13 +182,13 @@ impl JointLeastSquares {
         self.bank.hypotheses_mut().iter_mut().for_each(|hypothesis| hypothesis.propagate(&step));
         let variance = self.noise.variance();
         let mut expected = self.bank.likeliest().expect(&row, value, variance);
-        if Trust::of(expected.normalised).is_outlier() {
+        if Trust::from_normalised(expected.normalised).is_outlier() {
             // Impossible to one assumption, as a force that jumps to one that knows of none: it gives
             // way to one under which the speed is possible.
             let mut place = self.bank.likeliest_index();
             for (index, hypothesis) in self.bank.hypotheses().iter().enumerate() {
                 let other = hypothesis.expect(&row, value, variance);
-                let is_possible = !Trust::of(other.normalised).is_outlier();
+                let is_possible = !Trust::from_normalised(other.normalised).is_outlier();
                 if is_possible && other.normalised.abs() < expected.normalised.abs() {
                     (expected, place) = (other, index);
                 }
@@ -199,7 +199,7 @@ impl JointLeastSquares {
             self.reset();
             return self.begin(motion);
         }
-        let trust = Trust::of(expected.normalised);
+        let trust = Trust::from_normalised(expected.normalised);
         let is_believed = self.outliers.push(trust.is_outlier());
         if trust.is_outlier() {
             if is_believed {

@@ -73,7 +73,7 @@ impl MassKalman {
         train: &Arc<TrainModel>,
     ) -> Result<Self, SettingError> {
         settings.check()?;
-        let inertia = Inertia::of(train);
+        let inertia = Inertia::from_train(train);
         let bank = BiasBank::new(
             Dynamics { resistance: settings.line_resistance(train), inertia },
             settings.bias_models(),

@@ -40,7 +40,7 @@ impl KnownMotion {
     ///
     /// `WheelSlide` while the speed is not the train's, `Missing` without force or gradient, `NotFinite` for a
     /// number that is not finite, `OutOfRange` for one that no train has.
-    pub fn of(sample: &ResolvedSample) -> Result<Self, RejectionReason> {
+    pub fn from_sample(sample: &ResolvedSample) -> Result<Self, RejectionReason> {
         if sample.is_sliding {
             return Err(RejectionReason::WheelSlide);
         }
@@ -78,7 +78,7 @@ impl KnownMotion {
     ///
     /// # Errors
     ///
-    /// `Idle` for a train that stands, else the refusal with the reason of [`KnownMotion::of`].
+    /// `Idle` for a train that stands, else the refusal with the reason of [`KnownMotion::from_sample`].
     pub fn seen<T>(
         sample: &ResolvedSample,
         speed_min_mps: f64,
@@ -88,7 +88,7 @@ impl KnownMotion {
             *last = None;
             return Err(Outcome::Idle);
         }
-        KnownMotion::of(sample).map_err(|reason| {
+        KnownMotion::from_sample(sample).map_err(|reason| {
             if reason == RejectionReason::WheelSlide {
                 *last = None;
             }
@@ -116,7 +116,7 @@ pub struct Inertia {
 
 impl Inertia {
     /// Returns that of a train.
-    pub fn of(train: &TrainModel) -> Self {
+    pub fn from_train(train: &TrainModel) -> Self {
         let TrainModel { mass_kg, rotating_mass_factor, .. } = *train;
         Inertia { reference_mass_kg: mass_kg, rotating_mass_factor }
     }
@@ -163,7 +163,7 @@ impl LearningSet {
     /// As in Algorithm 1, a step in a curve inside a tunnel belongs to the curve set. A train has
     /// a length, which the paper's mass point lacks: steps while a part of it is inside belong to
     /// no set.
-    pub fn of(from: &KnownMotion, to: &KnownMotion) -> Option<LearningSet> {
+    pub fn new(from: &KnownMotion, to: &KnownMotion) -> Option<LearningSet> {
         let is_curved = from.curvature_per_m > 0.0 || to.curvature_per_m > 0.0;
         if is_curved {
             let change = (to.curvature_per_m - from.curvature_per_m).abs();
@@ -194,9 +194,9 @@ mod tests {
     #[test]
     fn a_correction_that_takes_resistance_away_is_no_reason_to_refuse_a_sample() {
         let warm = ResolvedSample { extra_n_per_kn: -1.7, ..ResolvedSample::coasting() };
-        assert_eq!(KnownMotion::of(&warm).unwrap().known_n_per_kn, -1.7);
+        assert_eq!(KnownMotion::from_sample(&warm).unwrap().known_n_per_kn, -1.7);
         let absurd = ResolvedSample { extra_n_per_kn: -501.0, ..warm };
-        assert_eq!(KnownMotion::of(&absurd), Err(RejectionReason::OutOfRange));
+        assert_eq!(KnownMotion::from_sample(&absurd), Err(RejectionReason::OutOfRange));
     }
 
     #[test]
@@ -239,7 +239,7 @@ mod section_tests {
     }
 
     fn steady(curvature_per_m: f64, tunnel_share: f64) -> Option<LearningSet> {
-        LearningSet::of(&at(curvature_per_m, tunnel_share), &at(curvature_per_m, tunnel_share))
+        LearningSet::new(&at(curvature_per_m, tunnel_share), &at(curvature_per_m, tunnel_share))
     }
 
     #[test]
@@ -252,9 +252,9 @@ mod section_tests {
 
     #[test]
     fn a_train_on_its_way_in_belongs_to_no_set() {
-        assert_eq!(LearningSet::of(&at(0.0, 0.0), &at(0.0005, 0.0)), None);
-        assert_eq!(LearningSet::of(&at(0.0005, 0.0), &at(0.0009, 0.0)), None);
-        assert_eq!(LearningSet::of(&at(0.0, 0.4), &at(0.0, 0.6)), None);
+        assert_eq!(LearningSet::new(&at(0.0, 0.0), &at(0.0005, 0.0)), None);
+        assert_eq!(LearningSet::new(&at(0.0005, 0.0), &at(0.0009, 0.0)), None);
+        assert_eq!(LearningSet::new(&at(0.0, 0.4), &at(0.0, 0.6)), None);
         assert_eq!(steady(0.0, 0.4), None);
     }
 }

@@ -10,7 +10,7 @@ use super::known_motion::KnownMotion;
 ///
 /// The paper's curve resistance z2 knows no radius. Here it holds at a reference radius and
 /// goes with 1/R, as all curve formulas do; on a line of equal radii the two are the same.
-/// All of it comes in addition to what is declared of curves, tunnels and the rest
+/// All of it comes in addition to the declaration of curves, tunnels and the rest
 /// ([`KnownMotion::known_n_per_kn`]), which acts in any case: the paper declares none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineResistance {
@@ -35,7 +35,7 @@ impl LineResistance {
         }
     }
 
-    /// Returns all that retards in N/kN at a speed in m/s: this resistance plus what is known.
+    /// Returns all that retards in N/kN at a speed in m/s: this resistance plus all known forces.
     #[inline]
     pub fn w_n_per_kn(&self, motion: &KnownMotion, speed_mps: f64) -> f64 {
         let curve = self.curve.map_or(0.0, |curve| {

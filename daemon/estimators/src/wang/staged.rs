@@ -78,7 +78,7 @@ impl StagedDescent {
         Ok(StagedDescent {
             settings,
             basis,
-            inertia: Inertia::of(train),
+            inertia: Inertia::from_train(train),
             basic: Stage::new(basis.of_davis(&train.resistance)),
             curve: Stage::new(SVector::zeros()),
             tunnel: Stage::new(SVector::zeros()),
@@ -90,7 +90,7 @@ impl StagedDescent {
         })
     }
 
-    /// z1, z2 and z3 as learned so far, the latter two beyond what is declared.
+    /// z1, z2 and z3 as learned so far, the latter two beyond the declaration.
     pub fn resistance(&self) -> LineResistance {
         let [basic, curve, tunnel] = LearningSet::ALL.map(|section| self.davis(section));
         LineResistance {
@@ -148,7 +148,7 @@ impl StagedDescent {
             return self.learn_mass(force_n, inertia_mps2 + 1e-3 * STANDARD_GRAVITY_MPS2 * w);
         }
         self.learned += 1;
-        let Some(section) = LearningSet::of(from, to) else { return Outcome::Used };
+        let Some(section) = LearningSet::new(from, to) else { return Outcome::Used };
         // Eq. (11), (12) and (18), uphill positive where the text has it negative, G in N and
         // the resistance per kN of it, and the rotating mass that (18) leaves out.
         let specific_mps2 = force_n / to.declared_kg - inertia_mps2;

@@ -249,7 +249,7 @@ impl SampleMoments {
     pub fn runs(&self, train: u64) -> Vec<RunMoments> {
         let samples: Vec<Moment> =
             self.samples.iter().filter(|it| it.train == train).copied().collect();
-        samples.chunk_by(|one, next| one.run == next.run).map(RunMoments::of).collect()
+        samples.chunk_by(|one, next| one.run == next.run).map(RunMoments::from_samples).collect()
     }
 }
 
@@ -261,7 +261,7 @@ pub struct RunMoments {
 }
 
 impl RunMoments {
-    fn of(samples: &[Moment]) -> Self {
+    fn from_samples(samples: &[Moment]) -> Self {
         let mut moments: Vec<_> = samples.iter().map(|it| (it.time_ns, it.logged_ns)).collect();
         moments.sort_unstable();
         RunMoments { moments }

@@ -93,7 +93,7 @@ impl ResolvedSample {
         Some(self.traction_force_n? - self.brake_force_n?)
     }
 
-    /// gamma, of what is declared.
+    /// gamma, of the declaration.
     #[inline]
     pub fn rotating_mass_factor(&self) -> f64 {
         self.inertial_mass_kg / self.mass_kg - 1.0

@@ -27,7 +27,7 @@ fn perfect_run(count: usize) -> Vec<ResolvedSample> {
 }
 
 fn rmse_mps(recording: &OpenLoopRecording, restart: Restart) -> f64 {
-    SpeedError::of(recording, &predict(recording, restart)).rmse_mps().unwrap()
+    SpeedError::new(recording, &predict(recording, restart)).rmse_mps().unwrap()
 }
 
 #[test]
@@ -71,7 +71,7 @@ fn a_long_gap_of_forces_is_left_out_and_the_speed_taken_up_after_it() {
     assert!(!recording.is_simulated(350) && recording.is_simulated(400));
     let prediction = predict(&recording, Restart::FullRun);
     assert_eq!(prediction.speed_mps()[400], recording.samples()[400].speed_mps);
-    assert_eq!(SpeedError::of(&recording, &prediction).count, 900);
+    assert_eq!(SpeedError::new(&recording, &prediction).count, 900);
 }
 
 #[test]

@@ -195,7 +195,7 @@ impl SpeedError {
     /// # Panics
     ///
     /// When the prediction belongs to another run.
-    pub fn of(recording: &OpenLoopRecording, prediction: &Prediction) -> Self {
+    pub fn new(recording: &OpenLoopRecording, prediction: &Prediction) -> Self {
         SpeedError::within(recording, prediction, 0..recording.samples().len())
     }
 

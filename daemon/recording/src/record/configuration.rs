@@ -31,7 +31,7 @@ impl Configuration {
     /// # Errors
     ///
     /// In words, what is not attached and why.
-    pub fn of(given: Option<&Path>, process: u32) -> Result<Self, String> {
+    pub fn new(given: Option<&Path>, process: u32) -> Result<Self, String> {
         let named = match given {
             Some(path) => Some(path.to_path_buf()),
             None => named_by(process),

@@ -298,7 +298,7 @@ pub struct Ages {
 
 impl Ages {
     /// Returns the files that a recorder finds when it begins; none took longer than `part`, where that is known.
-    pub fn of_what_is_there(output: &Path, part: Option<Duration>) -> Self {
+    pub fn from_existing(output: &Path, part: Option<Duration>) -> Self {
         let (at, mut age) = (Instant::now(), Duration::ZERO);
         let (mut ended, mut later) = (HashMap::new(), None::<SystemTime>);
         for (_, path) in numbered(output).into_iter().rev() {

@@ -150,7 +150,7 @@ impl Housekeeper {
             output: output.into(),
             rotation,
             keeper,
-            ages: Ages::of_what_is_there(output, rotation.age),
+            ages: Ages::from_existing(output, rotation.age),
             progress: Arc::clone(&progress),
             named: PathBuf::new(),
             is_failure_reported: false,

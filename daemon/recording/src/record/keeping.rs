@@ -19,7 +19,7 @@ use super::files::Aged;
 use super::kept_event::{self, KeptEvent, Reason, beside, forget_unfinished, kept_bytes};
 use dynocar_mcap::event::{Event, EventKind};
 
-/// Beside the ring: what is kept.
+/// Beside the ring: the kept values.
 const KEPT_FOLDER: &str = "kept";
 /// In the ring's folder: that this moment is to be kept, and why.
 const REQUEST_FILE: &str = "keep.request";
@@ -174,7 +174,7 @@ impl EventKeeper {
     ///
     /// When a file cannot be kept.
     pub fn keep(&mut self, event: &Event, files: &[Aged]) -> Result<(), KeepError> {
-        let reason = Reason::of(event, SystemTime::now());
+        let reason = Reason::new(event, SystemTime::now());
         let open = self.take_open();
         let is_new = open.is_none();
         let (folder, mut event) =

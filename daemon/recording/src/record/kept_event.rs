@@ -71,9 +71,9 @@ impl KeptEvent {
 
 impl Reason {
     /// Returns the reason that an event is.
-    pub fn of(event: &Event, now: SystemTime) -> Self {
+    pub fn new(event: &Event, now: SystemTime) -> Self {
         Reason {
-            at: UtcSecond::of(now).to_string(),
+            at: UtcSecond::from_time(now).to_string(),
             train: event.train_id,
             kind: event.kind().name().to_owned(),
             text: event.text.clone(),

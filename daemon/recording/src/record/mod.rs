@@ -167,7 +167,7 @@ impl Sink for Recorder {
     }
 
     fn daemon_came(&mut self, train: TrainId, process: u32) -> Result<(), RecordError> {
-        match Configuration::of(self.configuration.as_deref(), process) {
+        match Configuration::new(self.configuration.as_deref(), process) {
             Ok(configuration) => {
                 self.maintenance.follow(train, &configuration);
                 self.files.attach(configuration)

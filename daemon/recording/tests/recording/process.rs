@@ -112,7 +112,7 @@ fn a_recorder_outlives_daemons_and_controllers_and_what_is_killed_is_verified() 
     assert_eq!(read(&whole, &mut again).unwrap(), FileEnding::Whole);
     assert_eq!((&again.samples, &again.snapshots), (&left.samples, &left.snapshots));
 
-    let configurations = Configurations::of(&again).unwrap();
+    let configurations = Configurations::from_recording(&again).unwrap();
     let verified = verify(&again, &configurations);
     let other = DaemonConfig::load(&site.at("daemon.toml")).unwrap();
     let recorded = configurations.of_epoch(verified.last().unwrap().epoch).0;

@@ -13,7 +13,7 @@ fn verified(samples: &[TrainSample], snapshots: &[ParameterSnapshot]) -> Vec<Ver
     let path = folder.path().join("run.mcap");
     write(&path, samples, snapshots);
     let recording = Recording::load(&path).unwrap();
-    verify(&recording, &Configurations::of(&recording).unwrap())
+    verify(&recording, &Configurations::from_recording(&recording).unwrap())
 }
 
 #[test]
@@ -46,12 +46,12 @@ fn the_files_of_a_recording_that_rotated_are_verified_as_one_and_only_in_their_o
     }
     let whole = Recording::load_all(&files).unwrap();
     assert_eq!((whole.samples.len(), whole.attachments.len()), (samples.len(), 3));
-    for it in verify(&whole, &Configurations::of(&whole).unwrap()) {
+    for it in verify(&whole, &Configurations::from_recording(&whole).unwrap()) {
         assert_eq!((it.same, &it.outcome), (it.recorded, &ComparisonOutcome::Same), "{}", it.name);
         assert!(it.recorded > 30, "{}: {} snapshots", it.name, it.recorded);
     }
     let last = Recording::load(&files[2]).unwrap();
-    let late = verify(&last, &Configurations::of(&last).unwrap());
+    let late = verify(&last, &Configurations::from_recording(&last).unwrap());
     assert!(late.iter().all(|it| matches!(it.outcome, ComparisonOutcome::BeginsLate { .. })));
 
     let error = Recording::load_all(&[files[1].clone(), files[0].clone()]).unwrap_err().to_string();

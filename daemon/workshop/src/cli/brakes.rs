@@ -105,7 +105,7 @@ pub fn execute(arguments: &BrakesArguments) -> Result<(), Failure> {
     }
     if let Some(file) = &arguments.report {
         let made =
-            Provenance::of(&arguments.datasets[0], own_command_line()).map_err(Failure::input)?;
+            Provenance::new(&arguments.datasets[0], own_command_line()).map_err(Failure::input)?;
         write_file(file, &brakes_page::html(&answer, &made))?;
         report_line(&format!("report: {}", file.display()));
     }
@@ -178,14 +178,14 @@ fn answer(
         bound: lower_bound(law, arguments.confidence),
         build_up_s: build_up_s(law),
         service_build_up_s: service.as_ref().map(build_up_s),
-        cut_off: CutOff::of(of_law.filter_map(|it| it.cut_off_s)),
+        cut_off: CutOff::from_times(of_law.filter_map(|it| it.cut_off_s)),
         k_dry: corrections(law, train.brake_gear.components.as_ref()),
         k_wet: wet.as_ref().and_then(|wet| wet_share(law, wet)),
     };
     let supported = parameters.k_dry.iter().rev().find(|it| it.k_dry().is_some());
     let ebcl = arguments.ebcl.or(supported.map(|it| it.ebcl));
     let (etcs, rests_on) =
-        EtcsBrake::of(&parameters, &DeclaredBrakeFigures { ebcl, k_wet: arguments.k_wet });
+        EtcsBrake::new(&parameters, &DeclaredBrakeFigures { ebcl, k_wet: arguments.k_wet });
     let said = said(arguments, study, law, &parameters);
     Ok(BrakesAnswer {
         datasets: datasets.iter().map(|it| it.name.clone()).collect(),
@@ -360,7 +360,7 @@ const TABLES: TableColumns<TableLaw> = &[
 fn tables(file: &Path, json: Option<&Path>) -> Result<(), Failure> {
     let (label, text) = labelled_text(file).map_err(Failure::input)?;
     let tables = parse(&text).map_err(|words| Failure::Input(format!("{label}: {words}")))?;
-    let laws = of_each(&tables, |(name, rows)| TableLaw::of(name, rows));
+    let laws = of_each(&tables, |(name, rows)| TableLaw::new(name, rows));
     let none = || Failure::Input(format!("{label}: no brake stops as these rows say"));
     let laws: Vec<TableLaw> = laws.into_iter().collect::<Option<_>>().ok_or_else(none)?;
     Ok(give(json, &laws, || {

@@ -85,7 +85,7 @@ pub fn understand(source: DatasetSource, samples: SamplesOfRuns) -> Result<Under
     let Some(kind) = kind_of(&keys) else {
         return refuse(format!("{label}: {}; {EXPECTED}", found(&keys)));
     };
-    let mut understood = Understood::of(kind);
+    let mut understood = Understood::from_kind(kind);
     match kind {
         FileKind::Dataset => return read_dataset(source, samples),
         FileKind::Train => understood.train = Some(Arc::new(parse_train(&label, &text)?)),
@@ -128,6 +128,6 @@ fn read_dataset(source: DatasetSource, samples: SamplesOfRuns) -> Result<Underst
         dataset: Some((head.manifest, runs)),
         train: Some(head.train),
         track: head.track,
-        ..Understood::of(FileKind::Dataset)
+        ..Understood::from_kind(FileKind::Dataset)
     })
 }

@@ -109,7 +109,7 @@ pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
         write_plots(folder, &dataset, &explanation)?;
     }
     if let Some(file) = &arguments.annotate {
-        let timeline = Timeline::of(&dataset, &explanation);
+        let timeline = Timeline::new(&dataset, &explanation);
         annotate(source, &timeline, file)?;
     }
     Ok(give(arguments.json.as_deref(), &explanation.answer, || text(&explanation.answer))?)
@@ -205,7 +205,7 @@ pub fn page(
     explanation: &Explanation,
     command: String,
 ) -> Result<String, Failure> {
-    let provenance = Provenance::of(source, command)?;
+    let provenance = Provenance::new(source, command)?;
     report::page(dataset, explanation, &provenance).map_err(Failure::work)
 }
 

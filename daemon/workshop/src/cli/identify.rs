@@ -152,7 +152,7 @@ fn learned(
         threads.into_iter().map(|thread| thread.join().expect("an estimator")).collect()
     });
     let answer = |(settings, snapshot): (&EstimatorSettings, Result<_, _>)| match snapshot {
-        Ok(snapshot) => Ok(EstimatorAnswer::of(settings.kind(), &snapshot, speed_unit)),
+        Ok(snapshot) => Ok(EstimatorAnswer::new(settings.kind(), &snapshot, speed_unit)),
         Err(error) => Err(Failure::Input(format!("{error}"))),
     };
     estimators.iter().zip(snapshots).map(answer).collect()
@@ -162,7 +162,7 @@ fn by_run(
     dataset: &Dataset,
     learners: (&[EstimatorSettings], Unit),
 ) -> Result<Vec<RunAnswer>, Failure> {
-    let one = |(index, run)| Ok(RunAnswer::of(run, learned(dataset, &[index], learners)?));
+    let one = |(index, run)| Ok(RunAnswer::new(run, learned(dataset, &[index], learners)?));
     dataset.runs.iter().enumerate().map(one).collect()
 }
 

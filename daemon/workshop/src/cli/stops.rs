@@ -100,7 +100,7 @@ struct StopsAnswer {
 pub fn execute(arguments: &StopsArguments) -> Result<(), Failure> {
     require_files(&[(&arguments.json, "{")])?;
     let dataset = dataset::load(arguments.source.source())?;
-    let study = Study::of(&dataset, &arguments.study.settings(), &arguments.from);
+    let study = Study::new(&dataset, &arguments.study.settings(), &arguments.from);
     if study.stops.is_empty() {
         return Err(no_stop(&arguments.source.dataset));
     }

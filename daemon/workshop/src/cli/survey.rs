@@ -51,7 +51,7 @@ pub fn execute(arguments: &SurveyArguments) -> Result<(), Failure> {
     let made = arguments.threads.work(work)??;
     report_line(&format!("dataset: {} files in {}", made.files.len(), arguments.out.display()));
     if let Some(file) = &arguments.report {
-        let provenance = Provenance::of(source, own_command_line()).map_err(Failure::input)?;
+        let provenance = Provenance::new(source, own_command_line()).map_err(Failure::input)?;
         let page = page::html(&made.raw, &made.survey, &made.answer, &provenance)
             .map_err(|error| Failure::Work(format!("{}: {error}", file.display())))?;
         write_file(file, &page)?;

@@ -44,7 +44,7 @@ pub fn execute(arguments: &VerifyArguments) -> Result<(), Failure> {
         let words = "no snapshots: nothing to verify";
         return Err(Failure::Input(format!("{}: {words}", path.display())));
     }
-    let configurations = Configurations::of(recording);
+    let configurations = Configurations::from_recording(recording);
     let configurations =
         configurations.map_err(|it| Failure::Input(format!("{}: {it}", path.display())))?;
     let other = with.as_deref().map(DaemonConfig::load).transpose()?;

@@ -196,7 +196,7 @@ fn hash_of(path: &Path, memory: &mut LearnerMemory) -> io::Result<(String, UtcSe
     let (bytes, modified_ns) = (known.len(), since.as_nanos() as u64);
     let is_same = |it: &&KnownFile| it.bytes == bytes && it.modified_ns == modified_ns;
     if let Some(known) = memory.files.get(path).filter(is_same) {
-        return Ok((known.sha256.clone(), UtcSecond::of(modified)));
+        return Ok((known.sha256.clone(), UtcSecond::from_time(modified)));
     }
     let mut digest = Sha256::new();
     let (mut file, mut part) = (File::open(path)?, vec![0; 1 << 16]);
@@ -209,7 +209,7 @@ fn hash_of(path: &Path, memory: &mut LearnerMemory) -> io::Result<(String, UtcSe
     let sha256: String = digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
     let file = KnownFile { bytes, modified_ns, sha256: sha256.clone() };
     memory.files.insert(path.into(), file);
-    Ok((sha256, UtcSecond::of(modified)))
+    Ok((sha256, UtcSecond::from_time(modified)))
 }
 
 /// When a run was recorded by what its file or its dataset says.

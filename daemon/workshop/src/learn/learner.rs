@@ -133,7 +133,7 @@ impl Learner {
     ) -> Result<LearnerRound, LearnError> {
         let mut round = LearnerRound { trains: Vec::new(), is_stopped: false };
         for (train, declared) in self.settings.trains.clone() {
-            match self.train_round(train, &declared, UtcSecond::of(now), stop)? {
+            match self.train_round(train, &declared, UtcSecond::from_time(now), stop)? {
                 Some(of_train) => round.trains.push(of_train),
                 None => return Ok(LearnerRound { is_stopped: true, ..round }),
             }

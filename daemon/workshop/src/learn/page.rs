@@ -42,7 +42,7 @@ pub fn html(learner: &Learner, now: SystemTime) -> Result<String, LearnError> {
     let mut main = String::new();
     for train in trains {
         let models = settings.store.train(train);
-        let (history, events) = (ModelHistory::of(&models)?, models.events()?);
+        let (history, events) = (ModelHistory::from_train(&models)?, models.events()?);
         let open: Vec<&OpenQuestion> = learner.memory().open_of(train).collect();
         let errors = errors_by_day(&history, &TrialRecord::read(models.folder()))
             .map_err(|error| LearnError::Report(error.to_string()))?;
@@ -248,7 +248,7 @@ fn errors_by_day(history: &ModelHistory, trials: &TrialRecord) -> Result<String,
     Ok(figure("trace", caption, &key, &plots))
 }
 
-/// Returns the model that the decisions had put in force at the end of a day; `None` for what was declared.
+/// Returns the model that the decisions had put in force at the end of a day; `None` for the declaration.
 fn in_force_on(history: &ModelHistory, number: i64) -> Option<ModelHash> {
     let end_s = (number + 1) as u64 * DAY_S;
     let before = history.decisions.iter().map(|(_, it)| it).filter(|it| it.at.unix_s < end_s);

@@ -17,7 +17,7 @@ pub fn images(
     dataset: &Dataset,
     explanation: &Explanation,
 ) -> Result<Vec<(String, String)>, PlotError> {
-    let subject = &Subject::of(dataset, explanation);
+    let subject = &Subject::new(dataset, explanation);
     let (data, has_effect) = (&subject.data, subject.has_effect());
     let mut images = Vec::new();
     let mut keep = |name: String, plot: Plot| images.push((name, as_file(&plot.svg)));

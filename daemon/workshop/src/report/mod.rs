@@ -41,5 +41,5 @@ pub fn page(
     explanation: &Explanation,
     provenance: &Provenance,
 ) -> Result<String, PlotError> {
-    page::html(&Subject::of(dataset, explanation), provenance)
+    page::html(&Subject::new(dataset, explanation), provenance)
 }

@@ -43,7 +43,7 @@ impl Provenance {
     /// # Errors
     ///
     /// When a file of the dataset cannot be read.
-    pub fn of<'p>(
+    pub fn new<'p>(
         source: impl Into<DatasetSource<'p>>,
         command: String,
     ) -> Result<Self, LoadError> {
@@ -58,7 +58,7 @@ impl Provenance {
             command,
             version: env!("CARGO_PKG_VERSION"),
             machine: format!("{} on {}", std::env::consts::OS, std::env::consts::ARCH),
-            day: UtcSecond::of(made).day(),
+            day: UtcSecond::from_time(made).day(),
             files,
             sha256: hex(lines.as_bytes()),
         }

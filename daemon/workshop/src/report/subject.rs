@@ -17,8 +17,8 @@ pub struct Subject<'a> {
 
 impl<'a> Subject<'a> {
     /// Returns an explanation of a dataset.
-    pub fn of(dataset: &'a Dataset, explanation: &'a Explanation) -> Self {
-        Subject { dataset, explanation, data: ReportData::of(dataset, explanation) }
+    pub fn new(dataset: &'a Dataset, explanation: &'a Explanation) -> Self {
+        Subject { dataset, explanation, data: ReportData::new(dataset, explanation) }
     }
 
     /// Returns whether an effect was added to the model, so that there is an 'after'.

@@ -97,7 +97,7 @@ pub struct LearnedAnswer {
 
 impl SurveyAnswer {
     /// Returns the answer to a survey.
-    pub fn of(dataset: &Dataset, vehicle: &Vehicle, survey: &Survey) -> Self {
+    pub fn new(dataset: &Dataset, vehicle: &Vehicle, survey: &Survey) -> Self {
         let left_out = |number: usize| {
             let profile = survey.profile.as_ref()?;
             let pass = profile.trips.iter().position(|trip| *trip == number)?;
@@ -119,17 +119,17 @@ impl SurveyAnswer {
             }
         };
         SurveyAnswer {
-            line: SurveyedLine::of(survey),
+            line: SurveyedLine::from_survey(survey),
             trips: survey.trips.iter().enumerate().map(trip).collect(),
             not_used: survey.not_used.clone(),
-            learned: LearnedAnswer::of(vehicle, survey),
+            learned: LearnedAnswer::new(vehicle, survey),
             cannot_tell: cannot_tell(survey),
         }
     }
 }
 
 impl SurveyedLine {
-    fn of(survey: &Survey) -> Self {
+    fn from_survey(survey: &Survey) -> Self {
         let median = survey.profile.as_ref().and_then(|profile| {
             let entries = gradient_entries(survey, profile, 1);
             middle(&mut entries.iter().map(|entry| entry.std_permille).collect::<Vec<f64>>())
@@ -177,7 +177,7 @@ impl LearnedAnswer {
         rows.into_iter().filter_map(known).collect()
     }
 
-    fn of(vehicle: &Vehicle, survey: &Survey) -> Option<Self> {
+    fn new(vehicle: &Vehicle, survey: &Survey) -> Option<Self> {
         let profile = survey.profile.as_ref()?;
         let (fitted, brake) = (&profile.learned.profile, profile.learned.brake.as_ref());
         let (common, std, prior) = (&fitted.common, &fitted.common_std, &vehicle.prior);

@@ -60,7 +60,7 @@ pub fn survey_folder<'s>(
     }
     let material = Material { source, dataset: &raw, vehicle: &vehicle, survey: &survey, line };
     let files = write(&material, out)?;
-    let answer = SurveyAnswer::of(&raw, &vehicle, &survey);
+    let answer = SurveyAnswer::new(&raw, &vehicle, &survey);
     Ok(Surveyed { raw, survey, answer, files })
 }
 

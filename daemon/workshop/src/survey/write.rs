@@ -91,7 +91,7 @@ fn copied_line(line: &Path) -> Result<Vec<(String, String)>, SurveyFailure> {
     Ok(files)
 }
 
-/// Returns the declared train with what was learned.
+/// Returns the declared train with the learned values.
 fn train_toml(material: &Material) -> Result<String, SurveyFailure> {
     let (files, head) = open(material.source)?;
     let path = &head.manifest.train_file.path;

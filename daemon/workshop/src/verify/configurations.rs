@@ -46,7 +46,7 @@ impl Configurations {
     /// # Errors
     ///
     /// See [`ConfigurationProblem`].
-    pub fn of(recording: &Recording) -> Result<Self, ConfigurationProblem> {
+    pub fn from_recording(recording: &Recording) -> Result<Self, ConfigurationProblem> {
         let mut seen: Vec<SeenConfiguration> = Vec::new();
         for metadata in recording.metadata.iter().filter(|it| it.name == CONFIGURATION) {
             let number = |key| metadata.metadata.get(key).and_then(|it| it.parse::<i64>().ok());

@@ -48,7 +48,7 @@ pub enum ComparisonOutcome {
     Differs(SnapshotDifference),
 }
 
-/// A pipeline of a daemon for a train, with what became of its snapshots.
+/// A pipeline of a daemon for a train, with the fate of its snapshots.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verified {
     /// The daemon's start.

@@ -63,5 +63,5 @@ fn prediction_error(dataset: &Dataset, run: &Run, restart: Restart) -> Result<Sp
     let model = QuadraticForces::declared(&recording, train.resistance);
     let mut prediction = Prediction::new();
     prediction.simulate(&recording, &model, restart);
-    Ok(SpeedError::of(&recording, &prediction))
+    Ok(SpeedError::new(&recording, &prediction))
 }

@@ -29,7 +29,7 @@ fn decelerations(source: &Path) -> Result<String, String> {
     std::fs::copy(source, place.path().join("run.csv")).map_err(words)?;
     let dataset = dataset::load(place.path()).map_err(|error| error.to_string())?;
     let settings = StudySettings { find: FindSettings::default(), repeatability: 0.03 };
-    let study = Study::of(&dataset, &settings, &[]);
+    let study = Study::new(&dataset, &settings, &[]);
     let law = study.law.ok_or("no stop is found")?;
     let mean = |from_mps: f64, to_mps: f64| {
         let within = law.points.iter().filter(|it| (from_mps..=to_mps).contains(&it.speed_mps));

@@ -201,7 +201,7 @@ impl<'a> Day<'a> {
         }
     }
 
-    /// Every sample is accounted for by every pipeline; what became of them since the day began.
+    /// Every sample is accounted for by every pipeline; the fate of them since the day began.
     fn account(&mut self) -> TrainAccount {
         let mut all = self.ended;
         for train in &mut self.trains {

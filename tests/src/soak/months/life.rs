@@ -64,7 +64,7 @@ impl<'f> Life<'f> {
             train_type: settings.story.kind().is_none().then_some(TrainType::Regional),
             ..SimulatorSettings::new(settings.seed, request)
         };
-        let world = SimulatedWorld::of(&simulated);
+        let world = SimulatedWorld::from_settings(&simulated);
         write_declared(&world, folder);
         std::fs::create_dir_all(folder.join("models")).expect("a store");
         std::fs::create_dir_all(folder.join("runs")).expect("a folder of runs");
@@ -97,7 +97,7 @@ impl<'f> Life<'f> {
         })
         .expect("a learner");
         let monitor = build_pipeline(&config.pipelines[0], 0, &train).expect("a monitor");
-        let outcome = LifeOutcome::of(settings);
+        let outcome = LifeOutcome::from_settings(settings);
         let sequence = 0;
         Life {
             settings,
@@ -183,7 +183,7 @@ impl<'f> Life<'f> {
         if runs.is_empty() {
             return;
         }
-        let folder = self.folder.join("runs").join(UtcSecond::of(night).day());
+        let folder = self.folder.join("runs").join(UtcSecond::from_time(night).day());
         write_dataset(&dataset_of(&self.world, runs), &folder).expect("a day's runs");
     }
 

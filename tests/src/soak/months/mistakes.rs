@@ -30,7 +30,7 @@ pub struct MonthsMistakes {
     pub train_years: f64,
     /// Rivals that take away less than the least gain, whose adoption is a mistake.
     pub rivals: usize,
-    /// Rivals that take away more, by chance of what was declared; they are left out.
+    /// Rivals that take away more, by chance of the declaration; they are left out.
     pub better: usize,
     /// Adoptions of rivals that are no better.
     pub adopted: usize,
@@ -79,7 +79,7 @@ fn scores(seed: u64) -> Vec<Vec<f64>> {
         train_type: Some(TrainType::ALL[seed as usize % TrainType::ALL.len()]),
         ..SimulatorSettings::new(seed, EffectRequest::none())
     };
-    let world = SimulatedWorld::of(&settings);
+    let world = SimulatedWorld::from_settings(&settings);
     let declared = &world.train.declared;
     let track = Arc::new(world.line.track.clone());
     let rival = |change: &dyn Fn(&mut TrainModel)| {

@@ -38,7 +38,7 @@ pub struct LifeOutcome {
 
 impl LifeOutcome {
     /// Of a life that begins.
-    pub fn of(settings: LifeSettings) -> Self {
+    pub fn from_settings(settings: LifeSettings) -> Self {
         let (errors_mps, adoptions) = (Vec::new(), Vec::new());
         LifeOutcome { settings, errors_mps, adoptions, rounds: 0, events: Vec::new() }
     }

@@ -72,7 +72,12 @@ impl Hypothesis for DelayAndLag {
             Late::Both => (EffectKind::ActuatorDelay, BOTH),
             Late::Brake => (EffectKind::BrakeDelay, BRAKE),
         };
-        Nature { keys, turn: Turn::First, looks_back: true, ..Nature::of(kind, &delay::PARAMETERS) }
+        Nature {
+            keys,
+            turn: Turn::First,
+            looks_back: true,
+            ..Nature::new(kind, &delay::PARAMETERS)
+        }
     }
 
     fn sampling_error(&self, step_s: f64) -> f64 {

@@ -49,7 +49,7 @@ impl Hypothesis for Linear {
             least: Some(ambient::LEAST_PER_K),
             is_one_number_a_run: true,
             affine_in: Some(|value| value),
-            ..Nature::of(EffectKind::AmbientTemperature, &ambient::PARAMETERS)
+            ..Nature::new(EffectKind::AmbientTemperature, &ambient::PARAMETERS)
         }
     }
 

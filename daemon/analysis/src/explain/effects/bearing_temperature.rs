@@ -42,7 +42,7 @@ impl Hypothesis for Warming {
         Nature {
             keys: &[&bearings::DELTA_A, &bearings::TAU],
             handling: Handling::Added,
-            ..Nature::of(EffectKind::BearingTemperature, &bearings::PARAMETERS)
+            ..Nature::new(EffectKind::BearingTemperature, &bearings::PARAMETERS)
         }
     }
 

@@ -39,7 +39,7 @@ impl Hypothesis for Curves {
             none: self.declared_k,
             least: Some(curve::LEAST_N_PER_KN_M),
             handling: Handling::Added,
-            ..Nature::of(EffectKind::CurveResistance, &curve::PARAMETERS)
+            ..Nature::new(EffectKind::CurveResistance, &curve::PARAMETERS)
         }
     }
 

@@ -64,7 +64,7 @@ impl Hypothesis for Gain {
             none: 1.0,
             least: Some(least),
             affine_in: Some(f64::recip),
-            ..Nature::of(kind, &traction::PARAMETERS)
+            ..Nature::new(kind, &traction::PARAMETERS)
         }
     }
 

@@ -164,7 +164,7 @@ impl Hypothesis for Profile {
             choice_cost: self.choice_cost,
             shared_error: MAP_ERROR_PERMILLE,
             handling: Handling::Gradient,
-            ..Nature::of(EffectKind::GradientError, &self.parameters)
+            ..Nature::new(EffectKind::GradientError, &self.parameters)
         }
     }
 

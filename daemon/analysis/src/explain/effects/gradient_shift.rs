@@ -72,7 +72,7 @@ impl Hypothesis for Shift {
             // About this many shifts are as different as independent ones.
             choice_cost: 2.0 * 20f64.ln(),
             on_others: OnOthers::Changes,
-            ..Nature::of(EffectKind::GradientShift, &gradient::SHIFT_PARAMETERS)
+            ..Nature::new(EffectKind::GradientShift, &gradient::SHIFT_PARAMETERS)
         }
     }
 

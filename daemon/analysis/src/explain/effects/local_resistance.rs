@@ -107,7 +107,7 @@ impl Hypothesis for Local {
             choice_cost: self.site.choice_cost,
             shared_error: self.site.map_error,
             handling: Handling::Added,
-            ..Nature::of(EffectKind::LocalResistance, &place::PARAMETERS)
+            ..Nature::new(EffectKind::LocalResistance, &place::PARAMETERS)
         }
     }
 

@@ -127,7 +127,7 @@ impl Hypothesis for Slippery {
             // A cap is no factor on a shape, and a map's error is small beside a brake force.
             shared_error: if is_ratio { self.site.map_error } else { 0.0 },
             affine_in: is_ratio.then_some(|ratio| ratio),
-            ..Nature::of(EffectKind::LowAdhesion, parameters)
+            ..Nature::new(EffectKind::LowAdhesion, parameters)
         }
     }
 

@@ -32,7 +32,7 @@ impl Hypothesis for Gamma {
             shared_error: RunScatter::USUAL.force * (1.0 + self.declared),
             on_others: OnOthers::Scales,
             affine_in: Some(|gamma| 1.0 / (1.0 + gamma)),
-            ..Nature::of(EffectKind::RotatingMass, &rotating::PARAMETERS)
+            ..Nature::new(EffectKind::RotatingMass, &rotating::PARAMETERS)
         }
     }
 

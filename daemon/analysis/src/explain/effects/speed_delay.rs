@@ -63,7 +63,7 @@ impl Hypothesis for DelayAndLag {
             turn: Turn::Last,
             on_others: OnOthers::Changes,
             looks_back: true,
-            ..Nature::of(EffectKind::SpeedDelay, &speed_delay::PARAMETERS)
+            ..Nature::new(EffectKind::SpeedDelay, &speed_delay::PARAMETERS)
         }
     }
 

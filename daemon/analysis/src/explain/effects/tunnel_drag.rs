@@ -83,7 +83,7 @@ impl Hypothesis for Tunnels {
             choice_cost: self.site.choice_cost,
             shared_error: self.site.map_error,
             affine_in: Some(|value| value),
-            ..Nature::of(EffectKind::TunnelDrag, &tunnel::PARAMETERS)
+            ..Nature::new(EffectKind::TunnelDrag, &tunnel::PARAMETERS)
         }
     }
 

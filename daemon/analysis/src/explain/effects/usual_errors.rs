@@ -65,7 +65,7 @@ impl Hypothesis for UsualErrors {
             prior: Some(&self.information),
             turn: Turn::First,
             looks_back: self.figures.contains(&DeclaredFigure::Lateness),
-            ..Nature::of(EffectKind::None, &self.parameters)
+            ..Nature::new(EffectKind::None, &self.parameters)
         }
     }
 
@@ -116,7 +116,7 @@ struct Fitted {
 
 impl Hypothesis for Fitted {
     fn nature(&self) -> Nature<'_> {
-        Nature { handling: Handling::Gradient, ..Nature::of(EffectKind::None, &self.parameters) }
+        Nature { handling: Handling::Gradient, ..Nature::new(EffectKind::None, &self.parameters) }
     }
 
     fn apply(&self, parameters: &[f64], on: On, forces: &mut [SampleForces]) {

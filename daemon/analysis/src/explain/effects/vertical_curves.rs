@@ -70,7 +70,7 @@ impl Hypothesis for Rounded {
         Nature {
             prior: Some(&self.information),
             handling: Handling::Gradient,
-            ..Nature::of(EffectKind::None, &self.parameters)
+            ..Nature::new(EffectKind::None, &self.parameters)
         }
     }
 

@@ -34,7 +34,7 @@ impl Hypothesis for Scale {
             least: Some(wheel::LEAST),
             on_others: OnOthers::Scales,
             changes_speed_scale: true,
-            ..Nature::of(EffectKind::WheelDiameter, &wheel::PARAMETERS)
+            ..Nature::new(EffectKind::WheelDiameter, &wheel::PARAMETERS)
         }
     }
 

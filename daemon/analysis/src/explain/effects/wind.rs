@@ -73,7 +73,7 @@ impl Hypothesis for Steady {
         Nature {
             keys: &[&wind::WIND_PLUS],
             least: Some(wind::LEAST_MPS),
-            ..Nature::of(EffectKind::Wind, &[wind::PARAMETER])
+            ..Nature::new(EffectKind::Wind, &[wind::PARAMETER])
         }
     }
 
@@ -91,7 +91,7 @@ impl ByRun {
 
 impl Hypothesis for ByRun {
     fn nature(&self) -> Nature<'_> {
-        Nature::of(EffectKind::Wind, &self.parameters)
+        Nature::new(EffectKind::Wind, &self.parameters)
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {

@@ -70,7 +70,7 @@ pub struct Errors {
 
 impl Errors {
     /// Returns the errors of an explanation's models.
-    pub fn of(explanation: &Explanation) -> Self {
+    pub fn from_explanation(explanation: &Explanation) -> Self {
         let (before, after) = (&explanation.outcome.base, &explanation.outcome.fit);
         let (fit, holdout) = (&explanation.problem.runs[..], &explanation.holdout[..]);
         let pair = |runs: &[RunData], restart| error_pair(runs, before, after, restart);

@@ -60,16 +60,16 @@ pub struct ReportData {
 
 impl ReportData {
     /// Returns the contents of the report of this explanation of a dataset.
-    pub fn of(dataset: &Dataset, explanation: &Explanation) -> Self {
-        let errors = Errors::of(explanation);
+    pub fn new(dataset: &Dataset, explanation: &Explanation) -> Self {
+        let errors = Errors::from_explanation(explanation);
         let windows = windows::windows(explanation);
         ReportData {
             sentence: sentence::sentence(&explanation.answer, &errors),
             traces: timeline::traces(explanation),
             panels: panels::panels(dataset, explanation, &windows),
-            line: AlongLine::of(explanation, &windows),
+            line: AlongLine::new(explanation, &windows),
             parameters: parameters::rows(dataset, explanation),
-            places: PlaceTable::of(explanation),
+            places: PlaceTable::from_explanation(explanation),
             candidates: candidates::rows(explanation),
             errors,
         }

@@ -72,7 +72,7 @@ pub fn zones(explanation: &Explanation) -> Zones {
 
 impl Zones {
     /// Returns where one effect acts.
-    pub fn of(effect: &EffectAnswer) -> Self {
+    pub fn from_effect(effect: &EffectAnswer) -> Self {
         let mut zones = Zones::default();
         zones.add(effect);
         zones

@@ -53,7 +53,7 @@ pub fn rows(dataset: &Dataset, explanation: &Explanation) -> Vec<ParameterRow> {
     of_base.chain(of_effects).collect()
 }
 
-/// A number of an effect: what it means, its value, its standard deviation.
+/// A number of an effect: its meaning, its value, its standard deviation.
 struct Figure {
     meaning: String,
     value: f64,
@@ -79,7 +79,7 @@ fn effect_rows(dataset: &Dataset, effect: &EffectAnswer) -> Vec<ParameterRow> {
     rows.collect()
 }
 
-/// Returns the numbers of a parameter, each with what it means.
+/// Returns the numbers of a parameter, each with its meaning.
 fn figures(meaning: &str, value: &ParameterValue, std: Option<&ParameterValue>) -> Vec<Figure> {
     let listed = |index: usize| match std {
         Some(ParameterValue::List(list)) => list.get(index).copied(),
@@ -172,7 +172,7 @@ pub struct PlaceTable {
 
 impl PlaceTable {
     /// Returns the places in an answer.
-    pub fn of(explanation: &Explanation) -> Self {
+    pub fn from_explanation(explanation: &Explanation) -> Self {
         let mut table = PlaceTable::default();
         for effect in &explanation.answer.effects {
             if let Some(known) = &effect.place.uncertainty_95 {

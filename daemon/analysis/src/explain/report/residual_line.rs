@@ -47,7 +47,7 @@ pub struct AlongLine {
 
 impl AlongLine {
     /// Returns the effects of an explanation along the line, with these windows.
-    pub fn of(explanation: &Explanation, windows: &[FitWindow]) -> Self {
+    pub fn new(explanation: &Explanation, windows: &[FitWindow]) -> Self {
         let runs = &explanation.problem.runs;
         let covariance = covariance(explanation);
         let towards = |direction: f64| {

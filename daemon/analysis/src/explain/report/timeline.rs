@@ -92,11 +92,11 @@ pub struct ActingEffect {
 
 impl Timeline {
     /// Returns the timeline of an explanation of a dataset.
-    pub fn of(dataset: &Dataset, explanation: &Explanation) -> Self {
+    pub fn new(dataset: &Dataset, explanation: &Explanation) -> Self {
         let all = || explanation.problem.runs.iter().chain(&explanation.holdout);
         let of_file = |file: &str| all().find(|it| it.file == file);
         let of_run = |run: &crate::dataset::Run| {
-            Some(RunTimeline::of(run.number, of_file(&run.file)?, explanation))
+            Some(RunTimeline::new(run.number, of_file(&run.file)?, explanation))
         };
         Timeline {
             verdict: explanation.answer.verdict,
@@ -109,7 +109,7 @@ impl Timeline {
 }
 
 impl RunTimeline {
-    fn of(number: u32, run: &RunData, explanation: &Explanation) -> Self {
+    fn new(number: u32, run: &RunData, explanation: &Explanation) -> Self {
         let simulated = (0..run.samples().len()).filter(|&i| run.recording.is_simulated(i));
         let [base, grown] = [&explanation.outcome.base, &explanation.outcome.fit]
             .map(|it| missing_resistance(it, run));
@@ -156,7 +156,7 @@ fn acting(run: &RunData, explanation: &Explanation) -> Vec<ActingEffect> {
     };
     let mut acting = Vec::new();
     for (index, effect) in explanation.answer.effects.iter().enumerate() {
-        for [from_s, to_s] in Zones::of(effect).acting_s(run) {
+        for [from_s, to_s] in Zones::from_effect(effect).acting_s(run) {
             acting.push(ActingEffect {
                 kind: effect.kind.into(),
                 number: index as u32 + 1,

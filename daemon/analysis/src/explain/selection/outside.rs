@@ -83,10 +83,10 @@ impl Search<'_> {
             if base.model.has(EffectKind::Unknown) {
                 continue;
             }
-            let before = FitErrors::of(self.problem, base);
+            let before = FitErrors::new(self.problem, base);
             for noise in base.noise.stiffer() {
                 let Some((mut trial, _)) = self.look_again(base, noise, UNKNOWN) else { continue };
-                trial.reduction = FitErrors::of(self.problem, &trial.fit).reduction_from(&before);
+                trial.reduction = FitErrors::new(self.problem, &trial.fit).reduction_from(&before);
                 let is_better = Self::total(&trial.fit) < Self::total(&outcome.fit) - EQUAL;
                 if is_better && Self::refusal(&trial).is_none() {
                     outcome.fit = trial.fit;

@@ -79,8 +79,8 @@ impl Search<'_> {
             RoundSteps::of(self.progress, base.model.effects.len(), LIBRARY.len() + FINALISTS);
         let share = if asked.rivals_of.is_some() { RIVAL_SHARE } else { FINALIST_SHARE };
         let mut trials = self.try_all(base, &scan, &steps, not_testable, asked);
-        let before = FitErrors::of(self.problem, base);
-        let reduction = |fit: &Fit| FitErrors::of(self.problem, fit).reduction_from(&before);
+        let before = FitErrors::new(self.problem, base);
+        let reduction = |fit: &Fit| FitErrors::new(self.problem, fit).reduction_from(&before);
         let measure = |trials: &mut [(EffectTrial, &Effect)], is_asked: fn(f64) -> bool| {
             let asked = trials.iter_mut().filter(|(trial, _)| is_asked(trial.bic_gain));
             parallel::of_each_owned(asked, |_, (trial, _)| trial.reduction = reduction(&trial.fit));

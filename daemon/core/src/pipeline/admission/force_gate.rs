@@ -61,7 +61,7 @@ struct Reading {
 
 impl Reading {
     /// `None` for a sample that no estimator steps to.
-    fn of(sample: &ResolvedSample) -> Option<Self> {
+    fn from_sample(sample: &ResolvedSample) -> Option<Self> {
         let is_moving = sample.speed_mps > MOVING_MPS && !sample.is_sliding;
         let driving_n_per_kn = sample.driving_force_n()? / sample.weight_kn;
         (is_moving && driving_n_per_kn.is_finite()).then_some(Reading {
@@ -114,7 +114,7 @@ impl ForceGate {
     ///
     /// Bounded work, no allocation.
     pub fn judge(&mut self, sample: &ResolvedSample) -> GateVerdict {
-        let Some(now) = Reading::of(sample) else {
+        let Some(now) = Reading::from_sample(sample) else {
             // The estimator says what is wrong with it.
             self.forget();
             return GateVerdict::Take;

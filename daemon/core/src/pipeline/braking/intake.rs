@@ -110,7 +110,7 @@ impl BrakingIntake {
         settings: BrakingSettings,
         train: &TrainModel,
     ) -> Self {
-        let gear = DeclaredGear::of(&train.brake_gear);
+        let gear = DeclaredGear::from_gear(&train.brake_gear);
         BrakingIntake { quantity, settings, gear, resistance: train.resistance, braking: None }
     }
 
@@ -229,7 +229,7 @@ pub struct DeclaredGear {
 
 impl DeclaredGear {
     /// Returns the gear, `None` while a quantity is not declared or not positive.
-    pub fn of(gear: &BrakeGear) -> Option<Self> {
+    pub fn from_gear(gear: &BrakeGear) -> Option<Self> {
         let positive = |value: Option<f64>| value.filter(|v| v.is_finite() && *v > 0.0);
         let diameter_m = 1e-3 * positive(gear.cylinder_diameter_mm)?;
         let lever = positive(gear.disc_radius_mm)? / positive(gear.wheel_radius_mm)?;
@@ -277,7 +277,7 @@ pub(crate) mod tests {
         // In mm, kPa and kN, as printed.
         let area_mm2 = std::f64::consts::FRAC_PI_4 * 203.0 * 203.0;
         let printed_kn = area_mm2 * (297.6 / 460.0) * 410.0 * 0.85 * 2.55 * 0.28 * 95.0 * 1e-6;
-        let gear = DeclaredGear::of(&crh3()).unwrap();
+        let gear = DeclaredGear::from_gear(&crh3()).unwrap();
         assert!((gear.declared_force_n(410_000.0) - 1000.0 * printed_kn).abs() < 1e-6);
         // B/(Mg) as a check on the number of pads, which the papers do not give.
         assert!((printed_kn / (536.0 * 9.8) - 0.0942).abs() < 5e-5);
@@ -286,14 +286,14 @@ pub(crate) mod tests {
     #[test]
     fn a_gear_with_a_hole_is_not_declared() {
         let without_pads = BrakeGear { pads: None, ..crh3() };
-        assert_eq!(DeclaredGear::of(&without_pads), None);
+        assert_eq!(DeclaredGear::from_gear(&without_pads), None);
         let negative = BrakeGear { ratio: Some(-1.0), ..crh3() };
-        assert_eq!(DeclaredGear::of(&negative), None);
+        assert_eq!(DeclaredGear::from_gear(&negative), None);
     }
 
     #[test]
     fn a_pressure_below_zero_exerts_no_force() {
-        let gear = DeclaredGear::of(&crh3()).unwrap();
+        let gear = DeclaredGear::from_gear(&crh3()).unwrap();
         assert_eq!(gear.declared_force_n(-2_000.0), 0.0);
     }
 }

@@ -41,7 +41,7 @@ const ADHESION_REFERENCE: f64 = 0.1;
 
 /// Returns the declared value of a quantity.
 fn declared(quantity: BrakingCoefficient, train: &TrainModel) -> Option<f64> {
-    let gear = DeclaredGear::of(&train.brake_gear);
+    let gear = DeclaredGear::from_gear(&train.brake_gear);
     match quantity {
         BrakingCoefficient::Adhesion => None,
         BrakingCoefficient::Friction => gear.map(|gear| gear.friction),

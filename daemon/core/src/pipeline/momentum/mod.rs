@@ -228,7 +228,7 @@ impl UnitSample {
     ///
     /// [`RejectionReason::WheelSlide`] while the wheels slide, [`RejectionReason::Missing`]
     /// while a force or the gradient is missing.
-    pub fn of(sample: &ResolvedSample) -> Result<Self, RejectionReason> {
+    pub fn from_sample(sample: &ResolvedSample) -> Result<Self, RejectionReason> {
         if sample.is_sliding {
             return Err(RejectionReason::WheelSlide);
         }

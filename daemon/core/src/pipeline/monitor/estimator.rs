@@ -319,7 +319,7 @@ impl Estimator for ResidualMonitor {
         self.weigh(sample);
         self.pressure.push(sample);
         self.has_stopped |= sample.speed_mps <= STANDING_MPS;
-        let unit = match UnitSample::of(sample) {
+        let unit = match UnitSample::from_sample(sample) {
             Ok(unit) => unit,
             Err(reason) => {
                 if reason == RejectionReason::WheelSlide {

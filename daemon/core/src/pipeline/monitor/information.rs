@@ -76,7 +76,7 @@ pub struct Alternative {
 
 impl Alternative {
     /// Returns a parameter of so much information and right side, and a prior standard deviation.
-    fn of(own: f64, rest: f64, prior_std: f64) -> Self {
+    fn new(own: f64, rest: f64, prior_std: f64) -> Self {
         let prior = prior_std * prior_std;
         let precision = own + 1.0 / prior;
         Alternative { value: rest / precision, precision, cost: (own * prior).ln_1p() }
@@ -143,7 +143,7 @@ impl BaseSolution {
     /// Returns a suspect given the base model.
     pub fn alternative(&self, parameter: usize, prior_std: f64) -> Alternative {
         let index = parameter - BASE;
-        Alternative::of(self.own[index], self.rest[index], prior_std)
+        Alternative::new(self.own[index], self.rest[index], prior_std)
     }
 
     /// Returns the estimates with a suspect, of a prior standard deviation, or without one.
@@ -266,7 +266,7 @@ impl MonitorInformation {
         let common = base.columns.row(own).dot(&base.columns.row(taken));
         let share = (self.matrix[(parameter, other)] - common) / pivot;
         let left = (base.own[own] - share * share * pivot).max(0.0);
-        Alternative::of(left, base.rest[own] - share * base.rest[taken], prior_std)
+        Alternative::new(left, base.rest[own] - share * base.rest[taken], prior_std)
     }
 
     /// Returns the mean square of what base model and a suspect of such a ratio leave of the rows.

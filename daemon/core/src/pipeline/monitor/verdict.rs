@@ -133,7 +133,7 @@ impl MonitorVerdict {
         self.naming.clear(parameter);
     }
 
-    /// Takes in a row that the named suspect acts on: the squares of what is left of it with the
+    /// Takes in a row that the named suspect acts on: the squares of the rest of it with the
     /// suspect and without. True when its cause has ended.
     pub fn has_ended(&mut self, with: f64, without: f64) -> bool {
         self.naming.has_ended((with - without) / self.scale)

@@ -68,7 +68,7 @@ pub struct Trust {
 impl Trust {
     /// Judges a normalised innovation (Huber 1964).
     #[inline]
-    pub fn of(normalised: f64) -> Self {
+    pub fn from_normalised(normalised: f64) -> Self {
         let size = normalised.abs();
         let weight = match size > HUBER {
             true if size > OUTLIER => 0.0,
@@ -131,7 +131,7 @@ impl OutlierRow {
         noise_variance: f64,
     ) -> Result<(Innovation, Trust), NotPositiveDefinite> {
         let innovation = belief.innovation(component, measured, noise_variance)?;
-        let trust = Trust::of(innovation.normalised());
+        let trust = Trust::from_normalised(innovation.normalised());
         let is_believed = self.push(trust.is_outlier());
         if trust.is_full() {
             belief.take(component, &innovation, noise_variance);
@@ -259,10 +259,16 @@ mod outlier_tests {
 
     #[test]
     fn a_speed_counts_less_beyond_three_deviations_and_not_at_all_beyond_eight() {
-        assert_eq!(Trust::of(-2.0).weight, 1.0);
-        assert_eq!(Trust::of(6.0).weight, 0.5);
-        assert!(Trust::of(8.1).is_outlier() && Trust::of(f64::INFINITY).is_outlier());
-        assert_eq!(Trust::of(100.0).surprise(), Trust::of(8.0).surprise());
+        assert_eq!(Trust::from_normalised(-2.0).weight, 1.0);
+        assert_eq!(Trust::from_normalised(6.0).weight, 0.5);
+        assert!(
+            Trust::from_normalised(8.1).is_outlier()
+                && Trust::from_normalised(f64::INFINITY).is_outlier()
+        );
+        assert_eq!(
+            Trust::from_normalised(100.0).surprise(),
+            Trust::from_normalised(8.0).surprise()
+        );
     }
 
     #[test]

@@ -267,7 +267,7 @@ impl Estimator for TrainKalman {
     }
 
     fn update(&mut self, sample: &ResolvedSample) -> Outcome {
-        let unit = UnitSample::of(sample);
+        let unit = UnitSample::from_sample(sample);
         if let Ok(unit) = unit {
             self.steps.see(&unit);
         }

@@ -176,7 +176,7 @@ mod tests {
             for _ in 0..2000 {
                 let jump_variance = 1e-3 * jumps.share;
                 jumps.learn(&SpeedLikelihood {
-                    trust: Trust::of(0.0),
+                    trust: Trust::from_normalised(0.0),
                     innovation_mps,
                     variance: 1e-3 + jump_variance,
                     jump_variance,

@@ -68,7 +68,7 @@ fn after_a_restart_the_mass_and_the_resistance_are_known_with_the_first_seconds(
     let before = driven(&mut first, 0, 300);
     assert_eq!(before.status(), Status::Estimated);
     assert!((before.values[3] / 110.0 - 1.0).abs() < 0.01, "{}", before.values[3]);
-    let kept = KeptEstimate::of(&before).unwrap().after(2.0);
+    let kept = KeptEstimate::from_snapshot(&before).unwrap().after(2.0);
     let mut cold = estimator();
     assert_eq!(driven(&mut cold, 300, 5).status(), Status::Unestimated);
     let mut warm = estimator();
@@ -91,7 +91,7 @@ fn what_was_in_use_goes_on_with_the_first_sample_unless_minutes_have_passed() {
     (before.sample_time_ns, before.usable_quantities) = (300_000_000_000, BOTH);
     let first = |after_s: i64, elapsed_s: f64, speed_mps: f64| {
         let mut warm = estimator();
-        assert!(warm.warm_start(&KeptEstimate::of(&before).unwrap().after(elapsed_s)));
+        assert!(warm.warm_start(&KeptEstimate::from_snapshot(&before).unwrap().after(elapsed_s)));
         let time_ns = (300 + after_s) * 1_000_000_000;
         let sample = ResolvedSample { time_ns, speed_mps, ..ResolvedSample::coasting() };
         let (mut admission, mut snapshot) = (admission(), ParameterSnapshot::empty());

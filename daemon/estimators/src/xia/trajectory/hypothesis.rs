@@ -112,7 +112,7 @@ impl JumpHypothesis {
         for i in [A, B, C] {
             covariance[(i, i)] += variance[i];
         }
-        match CovarianceFactor::of(&covariance) {
+        match CovarianceFactor::from_covariance(&covariance) {
             Some(factor) => {
                 self.factor = factor;
                 self.age_s = 0.0;
@@ -209,7 +209,7 @@ pub fn united(one: (&JumpHypothesis, f64), other: (&JumpHypothesis, f64)) -> (Ju
     both.add(greater, &more.state, &more.factor.covariance());
     both.add(smaller, &less.state, &less.factor.covariance());
     let mut united = *more;
-    if let Some(factor) = CovarianceFactor::of(&both.belief.covariance) {
+    if let Some(factor) = CovarianceFactor::from_covariance(&both.belief.covariance) {
         united.state = both.belief.mean;
         united.factor = factor;
         united.unit = more.unit.mixed(&less.unit, smaller / both.weight);

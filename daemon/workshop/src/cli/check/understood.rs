@@ -19,7 +19,7 @@ use crate::report::plots::{Width, as_file, effort, line};
 pub struct Understood {
     /// Kind of the file.
     pub(super) kind: FileKind,
-    /// A dataset's file, with what became of each of its runs.
+    /// A dataset's file, with the fate of each of its runs.
     pub dataset: Option<(Manifest, Vec<Result<Run, DatasetError>>)>,
     /// A train.
     pub(super) train: Option<Arc<TrainModel>>,
@@ -31,7 +31,7 @@ pub struct Understood {
 
 impl Understood {
     /// Returns nothing yet of a file of this kind.
-    pub(super) fn of(kind: FileKind) -> Self {
+    pub(super) fn from_kind(kind: FileKind) -> Self {
         Understood { kind, dataset: None, train: None, track: None, daemon: None }
     }
 

@@ -55,7 +55,7 @@ pub(super) struct SampleCounts {
 
 impl EstimatorAnswer {
     /// Returns the answer of a snapshot.
-    pub(super) fn of(kind: PipelineKind, snapshot: &ParameterSnapshot, speed_unit: Unit) -> Self {
+    pub(super) fn new(kind: PipelineKind, snapshot: &ParameterSnapshot, speed_unit: Unit) -> Self {
         let parameters = || Parameter::ALL.iter().filter(|&&it| snapshot.index_of(it).is_some());
         EstimatorAnswer {
             name: kind.name(),

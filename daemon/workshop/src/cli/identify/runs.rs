@@ -52,7 +52,7 @@ impl RunAnswer {
     }
 
     /// Returns the estimates from a run.
-    pub(super) fn of(run: &Run, estimators: Vec<EstimatorAnswer>) -> Self {
+    pub(super) fn new(run: &Run, estimators: Vec<EstimatorAnswer>) -> Self {
         RunAnswer {
             number: run.number,
             file: run.file.clone(),

@@ -104,7 +104,7 @@ fn numbers_of(path: &Path, name: &str) -> Result<Vec<f64>, String> {
     read.columns.into_iter().find_map(|it| it.values).ok_or_else(|| "no values".into())
 }
 
-/// Columns as text; one that cannot be mapped holds the type of what it holds.
+/// Columns as text; one that cannot be mapped holds the type of its contents.
 fn as_csv(columns: &[(String, Result<Vec<f64>, String>)], trains: Option<&TrainColumn>) -> String {
     let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
     let names = columns.iter().map(|it| &it.0[..]).chain(trains.map(|it| &it.name[..]));
@@ -141,7 +141,8 @@ pub fn of_train(files: &[NamedText], named: Option<&str>) -> Result<Option<OfTra
     let layouts = files.iter().map(|(label, text)| layout(label, text));
     // A file without a layout is refused later.
     let Ok(layouts) = layouts.collect::<Result<Vec<_>, _>>() else { return Ok(None) };
-    let trains = files.iter().zip(&layouts).map(|((_, text), it)| TrainsColumn::of(text, &it.text));
+    let trains =
+        files.iter().zip(&layouts).map(|((_, text), it)| TrainsColumn::new(text, &it.text));
     let trains: Vec<Option<TrainsColumn>> = trains.collect();
     let Some(value) = named else {
         let mut several = files.iter().zip(&trains);

@@ -108,7 +108,7 @@ impl Hypothesis for Dragging {
         Nature {
             choice_cost: self.choice_cost,
             affine_in: Some(|value| value),
-            ..Nature::of(EffectKind::DraggingBrake, &brake::PARAMETERS)
+            ..Nature::new(EffectKind::DraggingBrake, &brake::PARAMETERS)
         }
     }
 

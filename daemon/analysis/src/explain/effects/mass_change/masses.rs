@@ -74,7 +74,7 @@ impl Hypothesis for Masses {
             prior: self.information.as_ref(),
             choice_cost: self.choice_cost,
             affine_in: Some(f64::recip),
-            ..Nature::of(EffectKind::MassChange, &self.parameters)
+            ..Nature::new(EffectKind::MassChange, &self.parameters)
         }
     }
 

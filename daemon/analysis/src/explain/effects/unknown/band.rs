@@ -154,7 +154,7 @@ impl Hypothesis for Band {
             shared_error: if is_on_line { MAP_ERROR_PERMILLE } else { 0.0 },
             handling: if is_force { Handling::Together } else { Handling::Added },
             affine_in: Some(|value| value),
-            ..Nature::of(EffectKind::Unknown, self.axis.parameters())
+            ..Nature::new(EffectKind::Unknown, self.axis.parameters())
         }
     }
 

@@ -141,7 +141,7 @@ impl Hypothesis for FormForce {
             choice_cost: self.choice_cost,
             handling: Handling::Added,
             feels_speed: self.factors.iter().any(|factor| factor.of == Covariate::Speed),
-            ..Nature::of(EffectKind::Unknown, &self.parameters)
+            ..Nature::new(EffectKind::Unknown, &self.parameters)
         }
     }
 

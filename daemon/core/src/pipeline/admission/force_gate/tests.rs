@@ -19,7 +19,7 @@ fn sample(index: usize, force_n_per_kn: f64) -> ResolvedSample {
     }
 }
 
-/// Times in s and forces in N/kN of what is taken, with the steps that lead there.
+/// Times in s and forces in N/kN of the taken values, with the steps that lead there.
 fn taken(gate: &mut ForceGate, samples: &[ResolvedSample]) -> Vec<(f64, f64, f64)> {
     let mut all = Vec::new();
     for it in samples {
