@@ -352,7 +352,7 @@ def test_the_page_is_complete_in_itself(done: Fleet) -> None:
     assert not re.search(r"<script|<link|<img|https?:|url\(|@import", page)
     assert "prefers-color-scheme: dark" in page
     assert "13 differs from the others in mass over the declared one" in page
-    assert "local resistance from 5.0" in page and "it belongs to the line" in page
+    assert "a local resistance from km 5.0" in page and "it belongs to the line" in page
 
 
 def test_descriptions_are_written_as_they_were_read(tmp_path: Path) -> None:
