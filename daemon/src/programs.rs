@@ -1,5 +1,4 @@
-//! Commands that other programs of the project carry out, so that the daemon links none of their libraries, and the
-//! failure of a command as JSON.
+//! Programs beside this one, which link libraries that a daemon does not need, and the failure of a command as JSON.
 
 use std::ffi::{OsStr, OsString};
 use std::io;
@@ -7,10 +6,7 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use clap::Args;
 use serde::Serialize;
-
-use super::cli::Failure;
 
 /// The program of what is done away from the controller.
 pub const WORKSHOP: &str = "dynocar-workshop";
@@ -88,39 +84,6 @@ pub struct ErrorAnswer {
 pub struct ErrorDocument {
     /// Reason for the missing result.
     pub error: ErrorAnswer,
-}
-
-/// Arguments after a command whose program reads them itself.
-#[derive(Debug, Args)]
-#[command(disable_help_flag = true)]
-pub struct Passed {
-    /// Options, as the command's own `--help` lists them
-    #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "OPTIONS")]
-    words: Vec<OsString>,
-}
-
-impl From<Vec<OsString>> for Passed {
-    fn from(words: Vec<OsString>) -> Self {
-        Passed { words }
-    }
-}
-
-/// Returns the arguments after the command.
-pub fn words_of_command() -> Passed {
-    Passed { words: std::env::args_os().skip(2).collect() }
-}
-
-/// Becomes the program that carries out a command, with the command's words.
-///
-/// `package` is the program's name and that of the package it is built from; `command` is the word that
-/// the program knows this command by, where it has several.
-///
-/// # Errors
-///
-/// Only when there is no such program, or it cannot be started.
-pub fn become_it(package: &str, command: Option<&str>, passed: &Passed) -> Result<(), Failure> {
-    let error = call(package).args(command).args(&passed.words).exec();
-    Err(Failure::Work(not_started(package, &error)))
 }
 
 #[cfg(test)]

@@ -165,9 +165,9 @@ const WORDINGS: [(&str, &str); 12] = [
     ("ends known to", "daemon/analysis/src/explain/report/effect.rs"),
     ("chance of as much", "daemon/analysis/src/explain/report/effect.rs"),
     ("kWh per 100 km", "daemon/analysis/src/explain/report/effect.rs"),
-    ("Found: the declared model", "daemon/analysis/src/explain/report/sentence.rs"),
-    ("Nothing undeclared acts", "daemon/analysis/src/explain/report/sentence.rs"),
-    ("Something undeclared acts", "daemon/analysis/src/explain/report/sentence.rs"),
+    ("Found: the declared model", "daemon/analysis/src/explain/report/effect.rs"),
+    ("Nothing undeclared acts", "daemon/analysis/src/explain/report/effect.rs"),
+    ("Something undeclared acts", "daemon/analysis/src/explain/report/effect.rs"),
     ("kind.replace(", "none: `kind_name` gives the words of a kind"),
 ];
 

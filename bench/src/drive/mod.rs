@@ -1,6 +1,7 @@
 //! Gain of a controller: an automatic driver with declared parameters, with the daemon's answers, and with the true
 //! ones.
 //!
+//! - [`answers`]: the daemon's answers as parameters of the driver, and their errors
 //! - [`knowledge`]: beliefs of a driver about its train, and the train's abilities
 //! - [`braking`]: the braking curve to the stopping point
 //! - [`plan`]: the line as the map has it, and the speed profile for the timetable with the least energy
@@ -12,6 +13,7 @@
 //! - [`run`]: all trains of a service with one kind of parameters
 //! - [`score`], [`picture`]: the result
 
+pub mod answers;
 pub mod braking;
 pub mod deviations;
 pub mod driver;

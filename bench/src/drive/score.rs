@@ -1,8 +1,8 @@
 //! Statistics of the legs of all trains, with intervals.
 
+use super::answers::ASKED;
 use super::deviations::Service;
 use super::journey::DrivenLeg;
-use super::knowledge::ASKED;
 use super::run::{DrivenRecord, Informant};
 use crate::chance::Chance;
 use crate::output::Record;

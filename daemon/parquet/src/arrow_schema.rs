@@ -7,7 +7,7 @@ use dynocar_mcap::columns::RecordingColumn;
 use flatbuffers::{FlatBufferBuilder, ForwardsUOffset, UnionWIPOffset, Vector, WIPOffset};
 use parquet::file::metadata::KeyValue;
 
-use crate::table_file::{ENTRY, integer};
+use crate::table::{ENTRY, integer};
 
 /// Key of a file's metadata that holds Arrow's schema.
 pub const KEY: &str = "ARROW:schema";

@@ -6,12 +6,13 @@
 //!
 //! # Layout
 //!
+//! - [`table`]: the tables of a recording, after `dynocar_mcap::columns`
 //! - [`arrow_schema`]: Arrow's schema of a table, beside Parquet's
 //! - [`error`]: why a file cannot be read, and how a damaged file affects its library
 //! - [`column_type`], [`file`](mod@file): types of the columns of a file, and their cells
 //! - [`columns`]: a Parquet file of anybody as columns of numbers, and whose its rows are
 //! - [`reading`]: Parquet to the messages of a recording, and to MCAP
-//! - [`table_file`], [`writing`]: the tables of a recording, after `dynocar_mcap::columns`; MCAP to Parquet
+//! - [`table_file`], [`writing`]: MCAP to Parquet
 
 pub mod arrow_schema;
 pub mod column_type;
@@ -19,5 +20,6 @@ pub mod columns;
 pub mod error;
 pub mod file;
 pub mod reading;
+pub mod table;
 pub mod table_file;
 pub mod writing;

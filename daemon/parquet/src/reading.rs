@@ -15,7 +15,7 @@ use parquet::data_type::ByteArray;
 
 use crate::error::{ParquetFileError, TableProblem, guarded};
 use crate::file::{ColumnReader, FileColumn, ParquetFile, damaged};
-use crate::table_file::{
+use crate::table::{
     ATTACHMENTS, KIND, LAYOUT, METADATA, TABLES, TableKind, attachment_columns, metadata_columns,
 };
 

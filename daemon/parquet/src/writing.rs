@@ -16,10 +16,10 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 
 use crate::reading::Attached;
-use crate::table_file::{
-    ATTACHMENTS, Cells, KIND, LAYOUT, METADATA, TABLES, TableFile, TableKind, attachment_columns,
-    metadata_columns,
+use crate::table::{
+    ATTACHMENTS, KIND, LAYOUT, METADATA, TABLES, TableKind, attachment_columns, metadata_columns,
 };
+use crate::table_file::{Cells, TableFile};
 
 /// Rows of a part of a file, which is encoded at once.
 const PART_ROWS: usize = 1 << 16;

@@ -9,10 +9,11 @@ use dynocar_dataset::{DatasetDiagnostic, top_keys};
 use serde::Serialize;
 
 use super::Failure;
+use super::companion::{become_it, words_of_command};
 use crate::config::DaemonConfig;
 use crate::dataset::{FileKind, kind_of, labelled_text};
 use crate::output::{give, report_line, require_file, write_json};
-use crate::programs::{ErrorAnswer, WORKSHOP, become_it, words_of_command};
+use crate::programs::{ErrorAnswer, WORKSHOP};
 
 pub use daemon::{DaemonAnswer, answer, read, report};
 

@@ -5,6 +5,7 @@
 //! 1 the work failed, 2 the command line or an input file is wrong; `health` has some of its own.
 
 pub mod check;
+mod companion;
 mod demo;
 mod failure;
 mod groups;
@@ -22,9 +23,10 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 pub use failure::Failure;
 
+use self::companion::{Passed, become_it};
 use super::programs::ErrorDocument;
 use crate::output::{OutputError, write_json};
-use crate::programs::{LIVE, Passed, RECORDING, WATCH, WORKSHOP, become_it};
+use crate::programs::{LIVE, RECORDING, WATCH, WORKSHOP};
 
 /// Dynocar, a dynamometer car in software.
 #[derive(Debug, Parser)]

@@ -9,14 +9,15 @@ mod error;
 mod parts;
 mod quantities;
 mod raw;
+mod whole;
 
 pub use apart::is_slow;
 pub use error::ConfigError;
 pub use parts::{
-    DaemonConfig, IdleStrategy, LogFormat, ModelsConfig, PipelineConfig, ProcessConfig,
-    StateConfig, ThreadConfig, TrainConfig,
+    IdleStrategy, LogFormat, ModelsConfig, PipelineConfig, ProcessConfig, StateConfig, ThreadConfig,
 };
 pub use quantities::Answers;
+pub use whole::{DaemonConfig, TrainConfig};
 
 use std::path::Path;
 
@@ -27,7 +28,7 @@ impl DaemonConfig {
     ///
     /// # Errors
     ///
-    /// See [`ConfigError`]; every message names the file and the expected value.
+    /// See [`ConfigError`]; every message names the file and what was expected.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
         let text = read_text(path)
             .map_err(|problem| ConfigError::Unreadable { path: path.into(), problem })?;

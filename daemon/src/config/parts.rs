@@ -1,17 +1,11 @@
-//! A configuration, its trains, and its parts: process, threads, pipelines, kept estimates.
+//! The parts of a configuration: process, threads, pipelines, what is kept.
 
-use std::net::SocketAddr;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use dynocar_estimators::EstimatorSettings;
-use dynocar_model::track::Track;
-use dynocar_model::train::TrainModel;
 use dynocar_shared::TrainId;
 use serde::Deserialize;
 
-use super::quantities::Answers;
-use crate::models::{ModelHash, ModelText};
 use crate::shadow::rule::Rule;
 
 /// Behaviour of a pipeline thread while no sample comes.
@@ -110,7 +104,7 @@ pub(super) const fn default_interval_s() -> u64 {
     30
 }
 
-/// The store of models, and the fate of those on trial.
+/// The store of models, and what becomes of those on trial.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelsConfig {
     /// The store's directory.
@@ -149,44 +143,4 @@ pub struct PipelineConfig {
     pub thread: usize,
     /// The trains it serves.
     pub trains: Vec<TrainId>,
-}
-
-/// A train that the daemon serves.
-#[derive(Clone, Debug)]
-pub struct TrainConfig {
-    /// Its number on the channels.
-    pub id: TrainId,
-    /// Declared model.
-    pub model: Arc<TrainModel>,
-    /// The line it runs on, when known.
-    pub track: Option<Arc<Track>>,
-    /// By what that model of train and line is known.
-    pub model_hash: ModelHash,
-    /// Text of the declared model, as its files spell it.
-    pub text: ModelText,
-    /// The models to be tried next to the one in force; those of the store when absent.
-    pub candidates: Option<Vec<ModelHash>>,
-    /// Which wheels it runs on; estimates are not kept across a change. Empty when not given.
-    pub wheel_set: String,
-    /// The pipelines that answer a controller's questions, each by its number.
-    pub answers: Answers,
-}
-
-/// A configuration, checked as a whole.
-#[derive(Clone, Debug)]
-pub struct DaemonConfig {
-    /// The process.
-    pub process: ProcessConfig,
-    /// The trains.
-    pub trains: Vec<TrainConfig>,
-    /// The threads.
-    pub threads: Vec<ThreadConfig>,
-    /// Loopback address that hands out metrics; none when absent.
-    pub metrics: Option<SocketAddr>,
-    /// Estimates that outlive the daemon; none are kept when absent.
-    pub state: Option<StateConfig>,
-    /// The store of models; without it what is declared stays in force.
-    pub models: Option<ModelsConfig>,
-    /// The pipelines, by the number that their snapshots carry.
-    pub pipelines: Vec<PipelineConfig>,
 }

@@ -17,22 +17,26 @@
 //! - [`moment`]: a time in UTC
 //! - [`origin`]: where a model came from; maintenance events
 //! - [`numbered`]: records with numbers: decisions, events
-//! - [`decision`]: decisions, and the state of each model that follows from them
+//! - [`decision`]: what was decided, and what follows from it
 //! - [`store`]: the directory
+//! - [`history`]: what each model is now
 //! - [`difference`]: in which keys two models differ
 
 pub mod decision;
 pub mod difference;
 mod error;
+pub mod history;
 pub mod moment;
 pub mod numbered;
 pub mod origin;
 pub mod store;
 pub mod text;
 
-pub use decision::{Action, Decision, ModelHistory, NewDecision, State};
+pub use decision::{Action, Decision, NewDecision};
 pub use error::ModelsError;
+pub use history::{ModelHistory, State};
 pub use moment::UtcSecond;
-pub use origin::{FoundEffect, MaintenanceEvent, ModelFigure, Origin};
+pub use origin::MaintenanceEvent;
+pub use origin::{FoundEffect, ModelFigure, Origin};
 pub use store::{Listing, NewModel, Store, Stored, TrainModels};
 pub use text::{ModelHash, ModelText};

@@ -3,10 +3,10 @@
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::answer::{DavisDeviations, EffectAnswer, Identifiability, PlaceUncertainty};
+use super::course::Course;
 use super::evidence::{Fit, FitProblem};
 use super::held_out::HeldOutEffect;
 use super::identifiability::not_held;
-use super::over_time::Course;
 use super::report::effect::{by_held_out_runs, small};
 use super::score::PredictionScore;
 use super::selection::{Deviations, Search, SearchOutcome};

@@ -13,7 +13,7 @@
 //!   usually wrong
 //! - [`score`], [`stop_to_stop`], `bootstrap`: open-loop prediction of fit and holdout runs
 //! - [`many`]: some of many runs for the search, all of them for sizes and scores
-//! - [`over_time`], [`held_out`]: numbers that differ between runs, and confirmation by the runs held out
+//! - [`course`], [`over_time`], [`held_out`]: numbers that differ between runs, and confirmation by the runs held out
 //! - [`unexplained`], [`identifiability`], [`competing`], [`meaning`], `caveats`, [`verdict`],
 //!   [`answer`]: the statement
 //! - [`report`]: further contents of a report
@@ -24,6 +24,7 @@ pub mod answer;
 mod bootstrap;
 mod caveats;
 pub mod competing;
+pub mod course;
 pub mod drive_efficiency;
 pub mod effects;
 pub mod evidence;

@@ -19,8 +19,7 @@ use super::evidence::p_value;
 use super::held_out::HeldOutEffect;
 use super::hypothesis::{Hypothesis, ReportedValues};
 use super::identifiability::identifiability;
-use super::report::effect::{located, small};
-use super::report::sentence::verdict_words;
+use super::report::effect::{located, small, verdict_words};
 use super::score::{self, PredictionScore};
 use super::selection::{
     Deviations, ScaleSources, Search, SearchOutcome, deciding_score, discounted, few_runs_factor,

@@ -14,8 +14,8 @@ use std::time::Duration;
 use dynocar::output::report_line;
 use dynocar::storage::{SharedStorage, Storage, settle};
 
-use super::files::{Aged, Ages};
 use super::keeping::{EventKeeper, KeepError};
+use super::ring::{Aged, Ages};
 use dynocar_mcap::event::Event;
 
 /// A task of the housekeeping.

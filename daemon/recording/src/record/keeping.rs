@@ -15,8 +15,8 @@ use dynocar::stamp::Stamp;
 use dynocar::storage::{SharedStorage, StorageError};
 use dynocar_shared::Status;
 
-use super::files::Aged;
 use super::kept_event::{self, KeptEvent, Reason, beside, forget_unfinished, kept_bytes};
+use super::ring::Aged;
 use dynocar_mcap::event::{Event, EventKind};
 
 /// Beside the ring: the kept values.

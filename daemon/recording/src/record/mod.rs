@@ -6,6 +6,7 @@ mod files;
 mod housekeeping;
 mod keeping;
 mod kept_event;
+mod ring;
 
 use std::path::PathBuf;
 use std::sync::Arc;

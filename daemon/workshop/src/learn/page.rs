@@ -4,7 +4,8 @@
 use std::collections::BTreeSet;
 use std::time::SystemTime;
 
-use dynocar::models::decision::{ModelHistory, State, in_force_after};
+use dynocar::models::decision::in_force_after;
+use dynocar::models::history::{ModelHistory, State};
 use dynocar::models::numbered::Numbered;
 use dynocar::models::origin::HeldOutError;
 use dynocar::models::{Action, Decision, MaintenanceEvent, ModelHash, Origin, Stored, UtcSecond};

@@ -1,4 +1,6 @@
-//! An effect in words: kind, size, location, cost to the railway, significance, and the recommended action.
+//! Effects and verdicts in words, one text with slots for the statement, the terminal, the page, the timeline and events.
+//!
+//! An effect has a kind, a size, a location, a cost to the railway, a significance, and a recommended action.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +10,7 @@ use dynocar_shared::vocabulary::{EffectKind, KindRow};
 
 use crate::explain::answer::{
     EffectAnswer, EffectMeaning, HeldOutAnswer, Location, MassWindow, ParameterValue,
-    PlaceUncertainty, RunWindow, in_plain_words,
+    PlaceUncertainty, RunWindow, Verdict, VerdictWords, in_plain_words,
 };
 use crate::explain::over_time::CHANCE_MAX;
 use crate::explain::selection::{EffectTrial, SearchOutcome};
@@ -231,6 +233,45 @@ fn precision(known: &PlaceUncertainty) -> Option<String> {
         return Some("ends certain".into());
     }
     (!shown.is_empty()).then(|| format!("ends known to ± {} or better", shown.join(", ± ")))
+}
+
+/// Returns a verdict with its effects, the kinds that explain the runs as well, and what it leaves open.
+pub fn verdict_words(
+    verdict: Verdict,
+    effects: &[EffectAnswer],
+    rivals: &[&'static str],
+    left: String,
+) -> VerdictWords {
+    let found: Vec<String> = effects.iter().map(described).collect();
+    let found = found.join("; and ");
+    let has_form = effects.iter().any(|it| it.kind == EffectKind::Unknown.name());
+    let heading = match (verdict, effects.len()) {
+        (Verdict::Effect, 1) => "Found: the declared model lacks one effect".into(),
+        (Verdict::Effect, count) => format!("Found: the declared model lacks {count} effects"),
+        (Verdict::Ambiguous, _) => {
+            "Something undeclared acts, but these runs do not show what".into()
+        }
+        (Verdict::Unknown, _) => {
+            "Something undeclared acts that no effect of the library explains".into()
+        }
+        (Verdict::None | Verdict::InsufficientData, _) => {
+            "Nothing undeclared acts, as far as these runs show: the declared model with a, b and \
+             c refitted explains them"
+                .into()
+        }
+    };
+    let whole = match verdict {
+        Verdict::Effect => format!("Found: {found}"),
+        Verdict::Ambiguous => {
+            let names: Vec<String> = rivals.iter().map(|it| kind_name(it).into()).collect();
+            let explain = if names.len() == 1 { "explains" } else { "explain" };
+            format!("{heading}: it may be {found}; {} {explain} them as well", joined(&names))
+        }
+        Verdict::Unknown if has_form => format!("{heading}: {found}"),
+        Verdict::Unknown if !found.is_empty() => format!("{heading}, beside {found}"),
+        _ => heading.clone(),
+    };
+    VerdictWords { heading: heading + ".", whole: whole + ".", left }
 }
 
 #[cfg(test)]

@@ -1,51 +1,11 @@
-//! The verdict in words: one text, whose slots are filled for the statement, the terminal and the page.
+//! The verdict of the page: the statement's words, the meaning of an effect, and the error reduction.
 
-use dynocar_model::words::{self, joined, kind_name};
-use dynocar_shared::vocabulary::EffectKind;
+use dynocar_model::words;
 
-use super::effect::{described, meaning};
+use super::effect::meaning;
 use super::errors::Errors;
 use crate::dataset::Role;
-use crate::explain::answer::{EffectAnswer, ExplainAnswer, Verdict, VerdictWords};
-
-/// Returns a verdict with its effects, the kinds that explain the runs as well, and what it leaves open.
-pub fn verdict_words(
-    verdict: Verdict,
-    effects: &[EffectAnswer],
-    rivals: &[&'static str],
-    left: String,
-) -> VerdictWords {
-    let found: Vec<String> = effects.iter().map(described).collect();
-    let found = found.join("; and ");
-    let has_form = effects.iter().any(|it| it.kind == EffectKind::Unknown.name());
-    let heading = match (verdict, effects.len()) {
-        (Verdict::Effect, 1) => "Found: the declared model lacks one effect".into(),
-        (Verdict::Effect, count) => format!("Found: the declared model lacks {count} effects"),
-        (Verdict::Ambiguous, _) => {
-            "Something undeclared acts, but these runs do not show what".into()
-        }
-        (Verdict::Unknown, _) => {
-            "Something undeclared acts that no effect of the library explains".into()
-        }
-        (Verdict::None | Verdict::InsufficientData, _) => {
-            "Nothing undeclared acts, as far as these runs show: the declared model with a, b and \
-             c refitted explains them"
-                .into()
-        }
-    };
-    let whole = match verdict {
-        Verdict::Effect => format!("Found: {found}"),
-        Verdict::Ambiguous => {
-            let names: Vec<String> = rivals.iter().map(|it| kind_name(it).into()).collect();
-            let explain = if names.len() == 1 { "explains" } else { "explain" };
-            format!("{heading}: it may be {found}; {} {explain} them as well", joined(&names))
-        }
-        Verdict::Unknown if has_form => format!("{heading}: {found}"),
-        Verdict::Unknown if !found.is_empty() => format!("{heading}, beside {found}"),
-        _ => heading.clone(),
-    };
-    VerdictWords { heading: heading + ".", whole: whole + ".", left }
-}
+use crate::explain::answer::{ExplainAnswer, Verdict, VerdictWords};
 
 /// Returns the verdict of an answer, the meaning of its effect and the error reduction.
 pub fn sentence(answer: &ExplainAnswer, errors: &Errors) -> String {
@@ -93,9 +53,10 @@ fn gained(errors: &Errors, with: &str) -> String {
 mod tests {
     use super::*;
     use crate::explain::answer::{
-        BaseAnswer, DavisDeviations, EffectMeaning, Location, ParameterValue,
+        BaseAnswer, DavisDeviations, EffectAnswer, EffectMeaning, Location, ParameterValue,
     };
     use crate::explain::report::IntervalEstimate;
+    use crate::explain::report::effect::verdict_words;
     use crate::explain::report::errors::{ErrorPair, Resampling};
     use crate::explain::stop_to_stop::StopToStop;
 
