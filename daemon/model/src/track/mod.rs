@@ -21,6 +21,11 @@ pub const RESISTANCE: &str = "resistance";
 /// process along the chainage.
 pub const GRADIENT_ERROR_FREE_M: f64 = 200.0;
 
+/// Returns the standard deviation of the mean of a gradient's error over a length in m, as a share of that at a place.
+pub fn gradient_error_of_mean(length_m: f64) -> f64 {
+    (GRADIENT_ERROR_FREE_M / length_m.max(GRADIENT_ERROR_FREE_M)).sqrt()
+}
+
 /// Share of a surveyed gradient's error that is still there after a distance in m.
 pub fn gradient_error_kept(distance_m: f64) -> f64 {
     (-2.0 * distance_m.abs() / GRADIENT_ERROR_FREE_M).exp()
@@ -220,7 +225,7 @@ impl Track {
         let length_m = to_m - from_m;
         let profile = self.survey.gradient_std_permille.as_ref()?;
         let std = profile.mean_around(0.5 * (from_m + to_m), length_m);
-        Some(std * (GRADIENT_ERROR_FREE_M / length_m.max(GRADIENT_ERROR_FREE_M)).sqrt())
+        Some(std * gradient_error_of_mean(length_m))
     }
 
     /// True when both directions have one gradient profile.
