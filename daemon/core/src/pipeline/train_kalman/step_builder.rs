@@ -32,6 +32,8 @@ const WIND_STEP_S: f64 = 1.0;
 
 /// Force in N/kN below which a brake is taken to have been released.
 const RELEASED: f64 = 0.1;
+/// Speed in m/s below which friction may take over from an electric brake.
+const FRICTION_MPS: f64 = 4.0;
 
 /// Error of a brake force over a step.
 struct BrakeError {
@@ -61,6 +63,10 @@ pub struct StepBuilder {
     known_rate: f64,
     /// Brake force in N/kN of a brake as slow as may be, and the time in ns it refers to.
     followed: f64,
+    /// True from a report of the brake until one of traction.
+    is_braking: bool,
+    /// True while a brake may act that is not reported.
+    is_stopping: bool,
     /// True from a standstill until the brake that held the train is released.
     was_held: bool,
     /// Direction between an error of the brake's scale and one of its time, of the newest step: one says nothing of the other.
@@ -87,6 +93,8 @@ impl StepBuilder {
             force_rate: 0.0,
             known_rate: 0.0,
             followed: 0.0,
+            is_braking: false,
+            is_stopping: false,
             was_held: false,
             brake_angle: 0.0,
             renewals: 0.0,
@@ -106,8 +114,13 @@ impl StepBuilder {
         let is_followed = segment == now.segment;
         self.unseen_m += if is_followed { since_s * now.speed_mps } else { f64::INFINITY };
         let left = (-since_s / self.settings.brake_lag_s).exp();
-        self.was_held |= now.speed_mps < self.settings.speed_min_mps;
-        self.followed = now.brake + left * (self.followed - now.brake);
+        let is_held = now.speed_mps < self.settings.speed_min_mps;
+        self.was_held |= is_held;
+        self.is_braking |= now.brake > RELEASED;
+        self.is_braking &= now.traction <= RELEASED;
+        self.is_stopping = self.is_braking && now.speed_mps < FRICTION_MPS && !is_held;
+        let followed = now.brake + left * (self.followed - now.brake);
+        self.followed = if self.is_stopping { followed.max(self.followed) } else { followed };
     }
 
     /// Returns how far a reported brake force may be off; its error goes on while no brake acts.
@@ -117,6 +130,7 @@ impl StepBuilder {
         let following = match lacking >= 0.0 {
             true => Following::Building,
             false if self.was_held => Following::Starting,
+            false if self.is_stopping => Following::Stopping,
             false => Following::Releasing,
         };
         let lateness = learned.late(following);
@@ -311,6 +325,24 @@ mod tests {
         let unseen = begun(&[coasting(20 * SECOND_NS, 20.0)]);
         assert!((unseen - gradient_error_kept(100.0)).abs() < 1e-12, "{unseen}");
         assert_eq!(begun(&[UnitSample { segment: 2, ..coasting(SECOND_NS, 1.0) }]), 0.0);
+    }
+
+    #[test]
+    fn a_brake_whose_report_fades_before_the_stop_may_act_until_the_train_is_driven() {
+        let resistance = ResistanceBelief::declared(&Davis { a: 1.5, b: 0.02, c: 0.001 }, 0.4);
+        let learned = LearnedState::new(&TrainKalmanSettings::default(), &resistance);
+        // The standard deviation of the brake force 10 s after the end of its report.
+        let std = |speed_mps: f64, traction: f64| {
+            let mut steps = StepBuilder::new(&TrainKalmanSettings::default(), 100.0);
+            steps.see(&UnitSample { brake: 30.0, ..coasting(0, speed_mps) });
+            let after = |k: i64| UnitSample { traction, ..coasting(k * SECOND_NS / 10, speed_mps) };
+            (1..=100).for_each(|k| steps.see(&after(k)));
+            let at = (&after(99), &after(100));
+            let step = steps.to(at, &ResolvedSample::coasting(), (0.0, &learned), &resistance);
+            step.brake_std / step.duration_s
+        };
+        assert!((std(3.0, 0.0) - 30.0).abs() < 1e-9);
+        assert!(std(3.0, 5.0) < 0.1 && std(8.0, 0.0) < 0.1);
     }
 
     #[test]
