@@ -2,6 +2,8 @@
 
 use dynocar_analysis::explain::answer::ExplainAnswer;
 use dynocar_analysis::explain::explain;
+use dynocar_model::track::LinearProfile;
+use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::effects::TrueMassSection;
@@ -79,6 +81,29 @@ fn the_drag_of_mapped_tunnels_is_found_in_them_whatever_else_the_map_lacks() {
     let effect = answer.effects.iter().find(|it| it.kind == EffectKind::TunnelDrag.name());
     let mapped = simulated.track().tunnels().len();
     assert_eq!(effect.unwrap().place.intervals_m.as_ref().unwrap().len(), mapped);
+}
+
+#[test]
+fn an_error_of_the_map_stays_right_where_the_line_rounds_its_steps() {
+    let effect = EffectKind::GradientError;
+    let settings = SimulatorSettings::new(9_900_002, EffectRequest::Kinds(vec![effect]));
+    let settings = SimulatorSettings { deviations: TrueDeviations::ROUGHER, ..settings };
+    let simulated = simulate(&SimulatorSettings { runs: 24, holdout_runs: 6, ..settings.clone() });
+    let truth = simulated.effects[0].parameters(0.0)["profile"].clone();
+    let rows = |profile: &serde_json::Value| -> Vec<(f64, f64)> {
+        serde_json::from_value(profile.clone()).unwrap()
+    };
+    let truth = LinearProfile::new(rows(&truth)).unwrap();
+    let written = serde_json::to_value(explained_of(24, settings)).unwrap();
+    let effects = written["effects"].as_array().unwrap();
+    let found = effects.iter().find(|it| it["kind"] == effect.name()).expect("it is found");
+    let [found, std] = ["parameters", "std"].map(|list| rows(&found[list]["profile"]));
+    let held = found
+        .iter()
+        .zip(&std)
+        .filter(|((at_m, permille), (_, std))| (permille - truth.at(*at_m)).abs() < HALF_95 * std);
+    // Without the rounding beside it, half of the values hold.
+    assert!(held.count() * 10 >= 9 * found.len(), "{found:?} ± {std:?}");
 }
 
 #[test]

@@ -125,6 +125,8 @@ impl Datagrams {
         let socket = UnixDatagram::bind(own).map_err(during("bind"))?;
         socket.set_nonblocking(!blocks)?;
         socket.set_read_timeout(blocks.then_some(BLOCK))?;
+        // Two ends with full queues would wait for each other for ever.
+        socket.set_write_timeout(blocks.then_some(BLOCK))?;
         Ok(Datagrams { socket, peer })
     }
 }
@@ -149,6 +151,7 @@ fn unless_passing(result: std::io::Result<usize>) -> Result<Option<usize>, Bench
         Err((_, error)) => Err(during("a datagram")(error)),
     }
 }
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -159,5 +162,20 @@ mod tests {
         let sample = TrainSample::empty(TrainId(7)).with(SampleField::Speed, 21.5);
         assert_eq!(from_bytes::<TrainSample>(as_bytes(&sample)), Some(sample));
         assert_eq!(from_bytes::<TrainSample>(&as_bytes(&sample)[1..]), None);
+    }
+    #[test]
+    fn ends_that_do_not_read_lose_messages_and_wait_for_each_other_no_longer_than_a_moment() {
+        let folder = tempfile::tempdir().unwrap();
+        let open = |end| Datagrams::open(folder.path(), end, true).unwrap();
+        let mut ends = [open(SocketEnd::Controller), open(SocketEnd::Server)];
+        // More than the kernel queues, 10 unless the system says otherwise.
+        let capacity: usize = std::fs::read_to_string("/proc/sys/net/unix/max_dgram_qlen")
+            .map_or(10, |text| text.trim().parse().unwrap());
+        for _ in 0..capacity + 5 {
+            ends.iter_mut().for_each(|end| Socket::send(end, &[0; 8]).unwrap());
+        }
+        let received =
+            std::iter::from_fn(|| Socket::receive(&mut ends[0], &mut [0; 8]).unwrap()).count();
+        assert!((1..capacity + 5).contains(&received), "{received} of {capacity}");
     }
 }

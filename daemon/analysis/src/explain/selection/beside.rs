@@ -62,12 +62,10 @@ impl Search<'_> {
         beside
     }
 
-    /// The errors of the map and how it rounds its steps; none where a gradient is fitted anyway, and where there is
-    /// no map or no measured position.
+    /// The errors of the map and how it rounds its steps, also beside a greater error that the runs show of it; none
+    /// where there is no map or no measured position.
     fn map_errors(&self, fit: &Fit) -> Vec<Candidate> {
-        let is_fitted = fit.model.effects.iter().any(|effect| effect.is_gradient());
-        let track =
-            self.track.filter(|_| !is_fitted && self.problem.positions.distance_ratio.is_some());
+        let track = self.track.filter(|_| self.problem.positions.distance_ratio.is_some());
         let span_m = self.scan(fit).and_then(|scan| span_m(&scan));
         let (Some(track), Some(span_m)) = (track, span_m.filter(|[low, high]| high > low)) else {
             return Vec::new();
