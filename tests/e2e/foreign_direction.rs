@@ -51,7 +51,8 @@ fn without_a_position_a_run_against_the_gradient_is_turned_and_that_is_a_doubt()
             "has no position and speeds up where it climbs: taken to go against the chainage";
         assert!(said.split_whitespace().collect::<Vec<_>>().join(" ").contains(words), "{said}");
         let mass_t = mass_t(&site);
-        assert!((mass_t.0 - 1692.0).abs() < 3.0 * mass_t.1, "{mass_t:?}");
+        // That of the last of the three runs, as the demo weighs it; the declared one is 7 % less.
+        assert!((mass_t.0 - 1813.5).abs() < 3.0 * mass_t.1, "{mass_t:?}");
     }
 }
 

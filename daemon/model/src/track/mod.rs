@@ -17,9 +17,13 @@ pub const TUNNELS: &str = "tunnels";
 /// The list of `[track]` that holds [start in m, end in m, extra in N/kN] of places that resist.
 pub const RESISTANCE: &str = "resistance";
 
-/// Errors of a surveyed gradient further apart than this in m are their own: the integral scale of a
-/// process along the chainage.
+/// Errors of a surveyed gradient further apart than this in m are their own: integral scale of a process along the line.
 pub const GRADIENT_ERROR_FREE_M: f64 = 200.0;
+
+/// Returns the standard deviation of the mean of a gradient's error over a length in m, as a share of that at a place.
+pub fn gradient_error_of_mean(length_m: f64) -> f64 {
+    (GRADIENT_ERROR_FREE_M / length_m.max(GRADIENT_ERROR_FREE_M)).sqrt()
+}
 
 /// Returns the share of a surveyed gradient's error that is still there after a distance in m.
 pub fn gradient_error_kept(distance_m: f64) -> f64 {
@@ -206,21 +210,19 @@ impl Track {
         })
     }
 
-    /// Returns the standard deviation in ‰ of the gradient under a train, as a survey states it; `None` when it is
-    /// not stated. How it goes with the distance: [`gradient_error_kept`].
+    /// Returns the standard deviation in ‰ of the gradient under a train, if a survey states it: see [`gradient_error_kept`].
     pub fn gradient_std_here_permille(&self, centre_m: f64, train_length_m: f64) -> Option<f64> {
         let half_m = 0.5 * train_length_m;
         self.gradient_std_permille(centre_m - half_m, centre_m + half_m)
     }
 
-    /// Returns the standard deviation in ‰ of the mean gradient over an interval, as a survey states it: errors
-    /// of intervals further apart than [`GRADIENT_ERROR_FREE_M`] are their own. `None` when it is not
-    /// stated.
+    /// Returns the standard deviation in ‰ of the mean gradient over an interval, as a survey states it: errors further
+    /// apart than [`GRADIENT_ERROR_FREE_M`] are their own. `None` when it is not stated.
     pub fn gradient_std_permille(&self, from_m: f64, to_m: f64) -> Option<f64> {
         let length_m = to_m - from_m;
         let profile = self.survey.gradient_std_permille.as_ref()?;
         let std = profile.mean_around(0.5 * (from_m + to_m), length_m);
-        Some(std * (GRADIENT_ERROR_FREE_M / length_m.max(GRADIENT_ERROR_FREE_M)).sqrt())
+        Some(std * gradient_error_of_mean(length_m))
     }
 
     /// Returns whether both directions have one gradient profile.

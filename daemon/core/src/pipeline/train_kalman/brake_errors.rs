@@ -76,7 +76,7 @@ impl Lateness {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrakeErrors {
     /// By [`Following`].
-    late: [Lateness; 3],
+    late: [Lateness; 4],
     /// Of the reported force.
     pub scale: LearnedStd,
 }
@@ -85,7 +85,7 @@ impl BrakeErrors {
     /// Before any braking, with the standard deviation of the scale.
     pub fn new(scale_std: f64) -> Self {
         let late = Lateness { mean: 0.0, spread: LearnedStd::new(1.0, 2.0) };
-        BrakeErrors { late: [late; 3], scale: LearnedStd::new(scale_std, 1.0) }
+        BrakeErrors { late: [late; 4], scale: LearnedStd::new(scale_std, 1.0) }
     }
 
     /// Returns how late it is.

@@ -81,7 +81,7 @@ impl TrainKalman {
         let first = ResistanceBelief::declared(&train.resistance, settings.prior_relative_std);
         let learned = LearnedState::new(&settings, &first);
         Ok(TrainKalman {
-            report: TrainKalmanReport::new(&learned.bank.published(0.0, 0.0)),
+            report: TrainKalmanReport::new(&learned.bank.published(0.0, 0.0, 0.0)),
             learned,
             settings,
             train_kg: train.mass_kg,
@@ -94,6 +94,7 @@ impl TrainKalman {
             systematic: Systematic::new(
                 settings.gradient_std_permille,
                 settings.acceleration_scale_std,
+                train.length_m,
             ),
             speeds: SpeedRange::default(),
             moved_s: 0.0,
@@ -104,15 +105,16 @@ impl TrainKalman {
         })
     }
 
-    fn begin(&mut self, now: UnitSample) -> Outcome {
+    fn begin(&mut self, now: UnitSample, sample: &ResolvedSample) -> Outcome {
         let gap_s = self
             .last_time_ns
             .map_or(f64::INFINITY, |last| now.time_ns.saturating_sub(last) as f64 * 1e-9);
         let noise_variance = self.learned.noise.variance_of_sample(f64::INFINITY);
         let wind = wind_over(gap_s.max(0.0), self.settings.wind_std_mps);
-        self.learned.bank.begin(now.speed_mps, noise_variance, gap_s.max(0.0), wind);
+        let map_error = self.steps.begin(sample);
+        let speed = (now.speed_mps, noise_variance);
+        self.learned.bank.begin(speed, gap_s.max(0.0), wind, &map_error);
         self.learned.monitor.break_here();
-        self.steps.begin();
         self.last = Some(now);
         Outcome::Used
     }
@@ -127,7 +129,7 @@ impl TrainKalman {
         let measured = self.learned.bank.measure(now.speed_mps, noise_variance, &step);
         let Some(measured) = measured.ok().filter(|_| self.learned.bank.is_sound()) else {
             self.reset();
-            return self.begin(now);
+            return self.begin(now, sample);
         };
         self.last = Some(now);
         if measured.trust.is_outlier() {
@@ -144,7 +146,7 @@ impl TrainKalman {
         self.systematic.see(step.travelled_m, sample.position_m, now.speed_mps);
         self.moved_s += step.duration_s;
         self.is_fresh_reset &= self.moved_s < self.moved_min_s;
-        self.judge(step.by_wind);
+        self.judge(step.direction, step.by_wind);
         Outcome::Updated
     }
 
@@ -158,14 +160,16 @@ impl TrainKalman {
         self.learned.jumps.learn(measured);
     }
 
-    fn judge(&mut self, by_wind: f64) {
+    fn judge(&mut self, direction: f64, by_wind: f64) {
         let inflation = self.long_run().clamp(1.0, LONG_RUN_MAX);
-        let published = self.learned.bank.published(by_wind, self.first.air_resistance());
+        let published =
+            self.learned.bank.published(direction, by_wind, self.first.air_resistance());
         self.report.take(&published, inflation, &self.systematic, &self.speeds);
     }
 
     fn reset(&mut self) {
         self.learned.bank = self.first.bank(&self.settings);
+        self.steps.leave_line();
         let (load, variance) = self.load.prior();
         self.learned.bank.each(|it| it.replace(LOAD, load, variance));
         self.learned.noise.reset();
@@ -173,7 +177,7 @@ impl TrainKalman {
         self.learned.brake = BrakeErrors::new(self.settings.brake_scale_std);
         self.moved_s = 0.0;
         self.moved_min_s = MOVED_MIN_S;
-        self.report = TrainKalmanReport::new(&self.learned.bank.published(0.0, 0.0));
+        self.report = TrainKalmanReport::new(&self.learned.bank.published(0.0, 0.0, 0.0));
         self.is_fresh_reset = true;
         self.resets += 1;
     }
@@ -215,7 +219,8 @@ impl TrainKalman {
             }
             self.speeds = SpeedRange::resumed(kept.use_before.speeds_mps);
             self.moved_min_s = 0.0;
-            self.report = TrainKalmanReport::resumed(&self.learned.bank.published(0.0, 0.0), known);
+            self.report =
+                TrainKalmanReport::resumed(&self.learned.bank.published(0.0, 0.0, 0.0), known);
         }
         mass.is_some()
     }
@@ -241,7 +246,7 @@ impl TrainKalman {
             None => {}
         }
         if change.is_some() {
-            self.judge(0.0);
+            self.judge(0.0, 0.0);
         }
         if self.load.has_departed {
             self.systematic.start();
@@ -289,7 +294,7 @@ impl Estimator for TrainKalman {
         });
         let outcome = match last {
             Some(last) => self.advance(last, now, sample),
-            None => self.begin(now),
+            None => self.begin(now, sample),
         };
         self.last_time_ns = Some(now.time_ns);
         outcome
@@ -309,7 +314,8 @@ impl Estimator for TrainKalman {
         let Some((mean, covariance)) = kept.moments(DAVIS) else { return false };
         self.first = ResistanceBelief::kept(&mean, &covariance);
         self.learned.bank = self.first.bank(&self.settings);
-        self.report = TrainKalmanReport::new(&self.learned.bank.published(0.0, 0.0));
+        self.steps.leave_line();
+        self.report = TrainKalmanReport::new(&self.learned.bank.published(0.0, 0.0, 0.0));
         self.moved_min_s = CONFIRMED_S;
         let mass = kept.moments([Parameter::Mass]).zip(kept.first_variance(Parameter::Mass));
         let mass = mass.and_then(|((mass_kg, aged), first)| {

@@ -1,10 +1,10 @@
 //! Filters side by side, one for each way in which the force that no model knows may behave.
 
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::{Matrix4, Vector3, Vector4};
 
 use super::motion_filter::{
-    BEHAVIOURS, BRAKE_ERROR, DISTURBANCE, FilterStep, LOAD, MotionFilter, MotionState, RESISTANCE,
-    SPEED, STATES, StateCovariance, WIND, behaviours,
+    BEHAVIOURS, BRAKE_ERROR, DISTURBANCE, FilterStep, LOAD, MAP_ERROR, MapError, MotionFilter,
+    MotionState, RESISTANCE, SPEED, STATES, StateCovariance, WIND, behaviours,
 };
 use crate::filter::bank::{Bank, Mixture};
 use crate::filter::{Gaussian, NotPositiveDefinite};
@@ -94,15 +94,16 @@ impl MotionBank {
         self.rivals.hypotheses_mut().iter_mut().for_each(|it| change(&mut it.filter.belief));
     }
 
-    /// Begins a motion at a measured speed, after a time in s without a sight of it, of whose wind so
-    /// much is left.
-    pub fn begin(&mut self, speed_mps: f64, noise_variance: f64, gap_s: f64, wind: (f64, f64)) {
+    /// Begins a motion at a measured speed with the variance of its noise, after a time in s without a sight of it, of
+    /// whose wind and error of the map so much is left.
+    pub fn begin(&mut self, speed: (f64, f64), gap_s: f64, wind: (f64, f64), map: &MapError) {
         for Rival { filter, outliers } in self.rivals.hypotheses_mut() {
             *outliers = OutlierRow::default();
-            filter.belief.replace(SPEED, speed_mps, noise_variance);
-            let (keep, renewed) = filter.behaviour.over(gap_s, 0.0, 0.0);
+            filter.belief.replace(SPEED, speed.0, speed.1);
+            let (keep, renewed) = filter.behaviour.over(gap_s);
             filter.belief.fade(DISTURBANCE, keep, renewed);
             filter.belief.fade(WIND, wind.0, wind.1);
+            filter.pass(map);
             filter.belief.replace(BRAKE_ERROR, 0.0, 1.0);
         }
     }
@@ -171,16 +172,16 @@ impl MotionBank {
         measured.ok_or(NotPositiveDefinite)
     }
 
-    /// Returns the mixture of all behaviours, each by its share; the wind is part of the disturbance, with the
-    /// addition of 1 m/s of it in N/kN by an air resistance c (scaled).
+    /// Returns the mixture of all behaviours, each by its share; the map's error in a direction and the wind are part of
+    /// the disturbance, with the addition of 1 m/s of it in N/kN by an air resistance c (scaled).
     ///
     /// # Real-time
     ///
     /// A few sums for each behaviour, no allocation.
-    pub fn published(&self, by_wind: f64, c: f64) -> Published {
-        const PLACES: [usize; 6] =
-            [RESISTANCE, RESISTANCE + 1, RESISTANCE + 2, LOAD, DISTURBANCE, WIND];
-        let mut mixture = Mixture::<6>::default();
+    pub fn published(&self, direction: f64, by_wind: f64, c: f64) -> Published {
+        const PLACES: [usize; 7] =
+            [RESISTANCE, RESISTANCE + 1, RESISTANCE + 2, LOAD, DISTURBANCE, WIND, MAP_ERROR];
+        let mut mixture = Mixture::<7>::default();
         let shares = self.rivals.shares(|_| true);
         for (share, Rival { filter, .. }) in shares.into_iter().zip(self.rivals.hypotheses()) {
             if share > SHARE_MIN {
@@ -193,9 +194,8 @@ impl MotionBank {
             }
         }
         let Gaussian { mean, covariance } = mixture.belief;
-        let variance = covariance[(4, 4)]
-            + 2.0 * by_wind * covariance[(4, 5)]
-            + by_wind * by_wind * covariance[(5, 5)];
+        let parts = Vector3::new(1.0, by_wind, direction);
+        let variance = parts.dot(&(covariance.fixed_view::<3, 3>(4, 4) * parts));
         // The filters take the wind by the declared air resistance. What it leaves open grows with the mean
         // square of the one that is learned.
         let square = mean[2] * mean[2] + covariance[(2, 2)];
@@ -205,7 +205,7 @@ impl MotionBank {
         Published {
             mean: mean.fixed_rows::<4>(0).into_owned(),
             covariance: covariance.fixed_view::<4, 4>(0, 0) + by_wind_alone * excess,
-            disturbance: (mean[4] + by_wind * mean[5], variance.max(0.0).sqrt()),
+            disturbance: (parts.dot(&mean.fixed_rows::<3>(4)), variance.max(0.0).sqrt()),
         }
     }
 
@@ -235,7 +235,7 @@ mod tests {
             for (i, j, value) in [(3, 3, 0.010), (9, 9, 2.0), (3, 9, -0.1), (9, 3, -0.1)] {
                 covariance[(i, j)] = value;
             }
-            MotionBank::new(&mean, &covariance).published(0.0, c).covariance[(0, 0)]
+            MotionBank::new(&mean, &covariance).published(0.0, 0.0, c).covariance[(0, 0)]
         };
         // Of 0.010 the wind leaves 0.1² / 2 = 0.005; it acts in proportion to c.
         assert!((variance_of_a(c) - 0.010).abs() < 1e-12);

@@ -1,7 +1,6 @@
 //! A Kalman filter of speed, disturbance, load and resistance over the steps between samples, and
 //! how a force that no model knows may behave in time.
 
-use dynocar_model::track::gradient_error_kept;
 use nalgebra::{SMatrix, SVector};
 
 use crate::filter::Gaussian;
@@ -26,8 +25,10 @@ pub const FORCE_DELAY: usize = 8;
 pub const WIND: usize = 9;
 /// Index of the error of the brake force's scale from braking to braking.
 pub const BRAKE_SCALE: usize = 10;
+/// Index of the error of the map's gradient in ‰, climbing where the chainage grows.
+pub const MAP_ERROR: usize = 11;
 /// Number of states.
-pub const STATES: usize = 11;
+pub const STATES: usize = 12;
 
 /// A state.
 pub type MotionState = SVector<f64, STATES>;
@@ -57,8 +58,19 @@ pub enum Following {
     Building,
     /// It is released under way.
     Releasing,
+    /// Its report fades as the train comes to a stand, which friction may do that is not reported.
+    Stopping,
     /// It held the standing train, and is released for the start: by friction, also where an electric brake does the rest.
     Starting,
+}
+
+/// Error of the map's gradient under the train after a distance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MapError {
+    /// Standard deviation in ‰, as surveyed or as the settings have it.
+    pub std_permille: f64,
+    /// Share of the error that is still there.
+    pub kept: f64,
 }
 
 /// Step between two samples, as every behaviour uses it.
@@ -92,8 +104,10 @@ pub struct FilterStep {
     pub jump_share: f64,
     /// Fastest change of force lately in N/kN per s.
     pub force_rate: f64,
-    /// Standard deviation in ‰ of the map's gradient beyond the usual, where one is stated.
-    pub map_std_permille: f64,
+    /// 1 along growing chainage, else -1.
+    pub direction: f64,
+    /// The map's error.
+    pub map_error: MapError,
     /// Variance in (N/kN)² that comes to each coefficient of the resistance.
     pub drift_variance: f64,
     /// Addition of 1 m/s of wind along the line in N/kN. It uses the declared air resistance: with the one learned
@@ -134,7 +148,8 @@ impl MotionFilter {
         let force = by_traction * traction - step.brake;
         let change = by_traction * step.traction_change;
         // Not times the load: a product of two unknowns would seem better known than it is.
-        let unexplained = step.duration_s * state[DISTURBANCE]
+        let unexplained = step.duration_s
+            * (state[DISTURBANCE] + step.direction * state[MAP_ERROR])
             + step.brake_std * state[BRAKE_ERROR]
             + step.brake * state[BRAKE_SCALE];
         let impulse = load * force - step.known - unexplained;
@@ -157,6 +172,7 @@ impl MotionFilter {
         let mut gradient = MotionState::zeros();
         gradient[SPEED] = 1.0 - seconds * slope;
         gradient[DISTURBANCE] = -seconds;
+        gradient[MAP_ERROR] = -seconds * step.direction;
         gradient[LOAD] = per_inertia * force;
         for i in 0..COEFFICIENTS {
             gradient[RESISTANCE + i] = -seconds * mean[i];
@@ -174,9 +190,9 @@ impl MotionFilter {
         let next_mps = start_mps + per_inertia * (impulse - step.duration_s * (w0 + wind));
         self.belief.rewrite(SPEED, next_mps, &gradient, variance);
 
-        let (keep, renewed) =
-            self.behaviour.over(step.duration_s, step.travelled_m, step.map_std_permille);
+        let (keep, renewed) = self.behaviour.over(step.duration_s);
         self.belief.fade(DISTURBANCE, keep, renewed);
+        self.pass(&step.map_error);
         for i in 0..COEFFICIENTS {
             self.belief.disturb(RESISTANCE + i, step.drift_variance);
         }
@@ -188,6 +204,13 @@ impl MotionFilter {
         self.belief.disturb(BRAKE_SCALE, step.brake_drift_variance);
     }
 
+    /// Passes a distance of the line.
+    pub fn pass(&mut self, map: &MapError) {
+        let renewed = 1.0 - map.kept * map.kept;
+        let square = self.behaviour.map_std_permille.powi(2) + map.std_permille.powi(2);
+        self.belief.fade(MAP_ERROR, map.kept, square * renewed);
+    }
+
     /// Variance in (m/s)² of the speed while a force changes that acts by d later than the step has it: its
     /// impulse is taken as d times the change at once, and is off by half d² times the rate until then.
     pub fn transient_variance(&self, step: &FilterStep) -> f64 {
@@ -197,16 +220,16 @@ impl MotionFilter {
     }
 }
 
-/// A force of mean zero that fades with time and with the distance, and is renewed (Ornstein, Uhlenbeck
-/// 1930), in N/kN.
+/// A force of mean zero that fades with time and is renewed (Ornstein, Uhlenbeck 1930), next to a map that is worse
+/// than stated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Behaviour {
     /// Standard deviation in N/kN.
     pub std_n_per_kn: f64,
-    /// Correlation time in s; infinite where only the distance counts.
+    /// Correlation time in s.
     pub time_s: f64,
-    /// True where it fades with the distance as a map's error does: see [`gradient_error_kept`].
-    pub is_of_line: bool,
+    /// Standard deviation in ‰ of the map beyond what is stated.
+    pub map_std_permille: f64,
     /// Logarithm of its probability before any sample.
     pub log_prior: f64,
 }
@@ -214,45 +237,33 @@ pub struct Behaviour {
 /// Number of behaviours.
 pub const BEHAVIOURS: usize = 7;
 
-/// Standard deviation in N/kN, correlation time in s, whether the line brings it, and probability
-/// before any sample: nothing but what models always miss; errors of a map; wind; gusts.
-const TABLE: [(f64, f64, bool, f64); BEHAVIOURS] = [
-    (0.02, 60.0, false, 0.30),
-    (0.1, f64::INFINITY, true, 0.20),
-    (0.3, f64::INFINITY, true, 0.10),
-    (0.1, 120.0, false, 0.20),
-    (0.3, 120.0, false, 0.10),
-    (1.0, 12.0, false, 0.05),
-    (1.0, 120.0, false, 0.05),
+/// Standard deviation in N/kN, correlation time in s, standard deviation in ‰ of the map beyond what is stated, and
+/// probability before any sample: nothing but what models always miss; a poor map; wind; gusts.
+const TABLE: [(f64, f64, f64, f64); BEHAVIOURS] = [
+    (0.02, 60.0, 0.0, 0.30),
+    (0.02, 60.0, 0.1, 0.20),
+    (0.02, 60.0, 0.3, 0.10),
+    (0.1, 120.0, 0.0, 0.20),
+    (0.3, 120.0, 0.0, 0.10),
+    (1.0, 12.0, 0.0, 0.05),
+    (1.0, 120.0, 0.0, 0.05),
 ];
-
-/// Standard deviation in ‰ of a map that [`TABLE`] takes into account.
-pub const USUAL_MAP_PERMILLE: f64 = 0.1;
 
 /// All behaviours that compete.
 pub fn behaviours() -> [Behaviour; BEHAVIOURS] {
-    TABLE.map(|(std_n_per_kn, time_s, is_of_line, probability)| Behaviour {
+    TABLE.map(|(std_n_per_kn, time_s, map_std_permille, probability)| Behaviour {
         std_n_per_kn,
         time_s,
-        is_of_line,
+        map_std_permille,
         log_prior: f64::ln(probability),
     })
 }
 
 impl Behaviour {
-    /// Share of the force that is left after a time in s on a way in m, and the variance in (N/kN)²
-    /// of what comes to it, on a line whose gradients are stated to a standard deviation in ‰.
-    ///
-    /// Force and stated error are one process here: its variance is the sum of the two, its
-    /// correlation over the step their mean weighted by the variances.
-    pub fn over(&self, time_s: f64, travelled_m: f64, map_std_permille: f64) -> (f64, f64) {
-        let own = self.std_n_per_kn.powi(2);
-        let map = map_std_permille.powi(2);
-        let on_line =
-            if self.is_of_line || map > 0.0 { gradient_error_kept(travelled_m) } else { 1.0 };
-        let own_kept = if self.is_of_line { on_line } else { (-time_s / self.time_s).exp() };
-        let keep = (own * own_kept + map * on_line) / (own + map);
-        (keep, (own + map) * (1.0 - keep * keep))
+    /// Returns the share of the force that is left after a time in s, and the variance in (N/kN)² of what comes to it.
+    pub fn over(&self, time_s: f64) -> (f64, f64) {
+        let keep = (-time_s / self.time_s).exp();
+        (keep, self.std_n_per_kn.powi(2) * (1.0 - keep * keep))
     }
 }
 
@@ -277,7 +288,8 @@ mod tests {
             impulse_variance: 0.0,
             jump_share: 0.0,
             force_rate: 0.0,
-            map_std_permille: 0.0,
+            direction: -1.0,
+            map_error: MapError { std_permille: 0.0, kept: 1.0 },
             drift_variance: 0.0,
             by_wind: 0.07,
             by_wind_square: 0.002,
@@ -289,7 +301,7 @@ mod tests {
 
     fn filter() -> MotionFilter {
         let mean =
-            MotionState::from([21.0, 0.3, 0.95, 1.6, 0.4, 0.9, 0.01, -0.02, 0.15, -1.2, 0.1]);
+            MotionState::from([21.0, 0.3, 0.95, 1.6, 0.4, 0.9, 0.01, -0.02, 0.15, -1.2, 0.1, 0.2]);
         let belief = Gaussian { mean, covariance: StateCovariance::zeros() };
         MotionFilter { behaviour: behaviours()[0], belief, jump_variance: 0.0 }
     }
@@ -335,16 +347,6 @@ mod tests {
 #[cfg(test)]
 mod behaviour_tests {
     use super::*;
-
-    #[test]
-    fn a_force_next_to_an_error_of_the_map_has_variance_and_correlation_of_their_sum() {
-        let force =
-            Behaviour { std_n_per_kn: 0.1, time_s: 60.0, is_of_line: false, log_prior: 0.0 };
-        let (keep, variance) = force.over(0.5, 5.0, 0.2);
-        let product = 0.01 * (-0.5_f64 / 60.0).exp() + 0.04 * gradient_error_kept(5.0);
-        assert!((keep * 0.05 - product).abs() < 1e-12);
-        assert!((keep * keep * 0.05 + variance - 0.05).abs() < 1e-12, "stationary");
-    }
 
     #[test]
     fn the_probabilities_before_any_sample_add_up_to_one() {

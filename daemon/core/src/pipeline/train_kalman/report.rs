@@ -1,7 +1,7 @@
 //! Uncertainty of the estimate, including the part that no number of samples of one train on one line reduces, and
 //! its form in a snapshot.
 
-use dynocar_model::track::GRADIENT_ERROR_FREE_M;
+use dynocar_model::track::{GRADIENT_ERROR_FREE_M, gradient_error_of_mean};
 use dynocar_shared::{ParameterSnapshot, Quantity};
 use nalgebra::{Matrix4, Vector4};
 
@@ -173,6 +173,8 @@ impl TrainKalmanReport {
 pub struct Systematic {
     /// Standard deviation in ‰ of gradients where no survey states one.
     gradient_std_permille: f64,
+    /// See [`gradient_error_of_mean`].
+    map_share: f64,
     /// Standard deviation of the scale of accelerations.
     scale_std: f64,
     /// Lowest and highest chainage in m.
@@ -185,10 +187,11 @@ pub struct Systematic {
 }
 
 impl Systematic {
-    /// Before the first sample.
-    pub fn new(gradient_std_permille: f64, scale_std: f64) -> Self {
+    /// Before the first sample of a train of a length in m.
+    pub fn new(gradient_std_permille: f64, scale_std: f64, train_length_m: f64) -> Self {
         Systematic {
             gradient_std_permille,
+            map_share: gradient_error_of_mean(train_length_m),
             scale_std,
             driven_m: None,
             top_mps: 0.0,
@@ -223,7 +226,7 @@ impl Systematic {
         let stops = (line_m / between_stops_m.max(1.0)).clamp(1.0, self.starts.max(1.0));
         let variance = self.gradient_std_permille.powi(2);
         let repeated = 1.0 - (line_m / self.travelled_m.max(1.0)).min(1.0);
-        (variance * repeated / pieces, variance * repeated / stops)
+        (variance * repeated / pieces, self.map_share.powi(2) * variance * repeated / stops)
     }
 
     /// Widens the covariance of a, b, c (scaled) and of the load factor.
@@ -253,7 +256,7 @@ mod tests {
     #[test]
     fn passing_a_line_again_makes_nothing_better_known() {
         let widened = |lengths_m: &[f64]| {
-            let mut systematic = Systematic::new(0.1, 0.0);
+            let mut systematic = Systematic::new(0.1, 0.0, 0.0);
             for length_m in lengths_m {
                 systematic.start();
                 systematic.see(*length_m, Some(0.0), 20.0);

@@ -2,12 +2,13 @@
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::wind;
+use dynocar_model::track::{gradient_error_kept, gradient_error_of_mean};
 
 use super::TrainKalmanSettings;
 use super::brake_errors::BrakeErrors;
 use super::force_history::ForceHistory;
 use super::learned_state::{LearnedState, ResistanceBelief};
-use super::motion_filter::{FilterStep, Following, USUAL_MAP_PERMILLE, wind_over};
+use super::motion_filter::{FilterStep, Following, MapError, wind_over};
 use crate::pipeline::momentum::UnitSample;
 
 /// How long a change of force is remembered, in s.
@@ -31,6 +32,8 @@ const WIND_STEP_S: f64 = 1.0;
 
 /// Force in N/kN below which a brake is taken to have been released.
 const RELEASED: f64 = 0.1;
+/// Speed in m/s below which friction may take over from an electric brake.
+const FRICTION_MPS: f64 = 4.0;
 
 /// Error of a brake force over a step.
 struct BrakeError {
@@ -51,6 +54,8 @@ struct BrakeError {
 pub struct StepBuilder {
     settings: TrainKalmanSettings,
     train_length_m: f64,
+    /// Error of the map under the train over that at a place, by standard deviation.
+    map_share: f64,
     acting: ForceHistory,
     /// Fastest change of the reported force lately in N/kN per s.
     force_rate: f64,
@@ -58,6 +63,10 @@ pub struct StepBuilder {
     known_rate: f64,
     /// Brake force in N/kN of a brake as slow as may be, and the time in ns it refers to.
     followed: f64,
+    /// True from a report of the brake until one of traction.
+    is_braking: bool,
+    /// True while a brake may act that is not reported.
+    is_stopping: bool,
     /// True from a standstill until the brake that held the train is released.
     was_held: bool,
     /// Direction between an error of the brake's scale and one of its time, of the newest step: one says nothing of the other.
@@ -66,7 +75,10 @@ pub struct StepBuilder {
     renewals: f64,
     /// Time in s since the wind was moved on.
     wind_s: f64,
-    seen_ns: Option<i64>,
+    /// Time in ns and motion segment of the newest sample.
+    seen: Option<(i64, u32)>,
+    /// Distance in m since a step was made, infinite before the first.
+    unseen_m: f64,
 }
 
 impl StepBuilder {
@@ -76,26 +88,39 @@ impl StepBuilder {
         StepBuilder {
             settings: *settings,
             train_length_m,
+            map_share: gradient_error_of_mean(train_length_m),
             acting,
             force_rate: 0.0,
             known_rate: 0.0,
             followed: 0.0,
+            is_braking: false,
+            is_stopping: false,
             was_held: false,
             brake_angle: 0.0,
             renewals: 0.0,
             wind_s: 0.0,
-            seen_ns: None,
+            seen: None,
+            unseen_m: f64::INFINITY,
         }
     }
 
     /// Takes in what is reported, also at a standstill.
     pub fn see(&mut self, now: &UnitSample) {
         self.acting.see((now.time_ns, now.segment), [now.traction, now.brake]);
-        let seen_ns = self.seen_ns.replace(now.time_ns).unwrap_or(i64::MIN);
+        let (seen_ns, segment) =
+            self.seen.replace((now.time_ns, now.segment)).unwrap_or((i64::MIN, 0));
         let since_s = (now.time_ns.saturating_sub(seen_ns) as f64 * 1e-9).max(0.0);
+        // Nobody knows where a train was between two segments.
+        let is_followed = segment == now.segment;
+        self.unseen_m += if is_followed { since_s * now.speed_mps } else { f64::INFINITY };
         let left = (-since_s / self.settings.brake_lag_s).exp();
-        self.was_held |= now.speed_mps < self.settings.speed_min_mps;
-        self.followed = now.brake + left * (self.followed - now.brake);
+        let is_held = now.speed_mps < self.settings.speed_min_mps;
+        self.was_held |= is_held;
+        self.is_braking |= now.brake > RELEASED;
+        self.is_braking &= now.traction <= RELEASED;
+        self.is_stopping = self.is_braking && now.speed_mps < FRICTION_MPS && !is_held;
+        let followed = now.brake + left * (self.followed - now.brake);
+        self.followed = if self.is_stopping { followed.max(self.followed) } else { followed };
     }
 
     /// Returns how far a reported brake force may be off; its error goes on while no brake acts.
@@ -105,6 +130,7 @@ impl StepBuilder {
         let following = match lacking >= 0.0 {
             true => Following::Building,
             false if self.was_held => Following::Starting,
+            false if self.is_stopping => Following::Stopping,
             false => Following::Releasing,
         };
         let lateness = learned.late(following);
@@ -126,18 +152,27 @@ impl StepBuilder {
         }
     }
 
-    /// Standard deviation in ‰ of the gradient beyond what behaviours take into account: as surveyed, or as the settings have it.
-    fn map_std_permille(&self, sample: &ResolvedSample) -> f64 {
-        if sample.gradient_std_permille > 0.0 {
-            return sample.gradient_std_permille;
-        }
-        let square = self.settings.gradient_std_permille.powi(2) - USUAL_MAP_PERMILLE.powi(2);
-        square.max(0.0).sqrt()
+    /// Begins a motion, and returns the map's error since the one before.
+    pub fn begin(&mut self, sample: &ResolvedSample) -> MapError {
+        (self.force_rate, self.known_rate) = (0.0, 0.0);
+        self.map_error(self.unseen_m, sample)
     }
 
-    /// A motion begins.
-    pub fn begin(&mut self) {
-        (self.force_rate, self.known_rate) = (0.0, 0.0);
+    /// Forgets the line that was driven.
+    pub fn leave_line(&mut self) {
+        self.unseen_m = f64::INFINITY;
+    }
+
+    /// Returns the map's error after a distance in m.
+    fn map_error(&mut self, travelled_m: f64, sample: &ResolvedSample) -> MapError {
+        self.unseen_m = 0.0;
+        let surveyed = sample.gradient_std_permille;
+        let declared = self.map_share * self.settings.gradient_std_permille;
+        MapError {
+            std_permille: if surveyed > 0.0 { surveyed } else { declared },
+            // The smaller a mean's error, the longer it stays.
+            kept: gradient_error_kept(travelled_m * self.map_share.powi(2)),
+        }
     }
 
     /// The step to the newest sample, if forces act by so much in s behind their report; what only the
@@ -182,9 +217,10 @@ impl StepBuilder {
         } else {
             wind_over(std::mem::take(&mut self.wind_s), settings.wind_std_mps)
         };
+        let travelled_m = half_s * (from.speed_mps + to.speed_mps);
         FilterStep {
             duration_s,
-            travelled_m: half_s * (from.speed_mps + to.speed_mps),
+            travelled_m,
             inertia: to.inertia,
             delay_s: acting.delay_s,
             traction: acting.impulses[0],
@@ -197,7 +233,8 @@ impl StepBuilder {
             jump_share: learned.jumps.share,
             impulse_variance: by_place + by_gusts,
             force_rate: self.force_rate,
-            map_std_permille: self.map_std_permille(sample),
+            direction: sample.direction,
+            map_error: self.map_error(travelled_m, sample),
             drift_variance: settings.drift_n_per_kn_per_sqrt_h.powi(2) * duration_s / 3600.0,
             by_wind: sample.direction * by_wind,
             by_wind_square: air.by_wind_square(),
@@ -213,6 +250,22 @@ mod tests {
     use super::*;
     use dynocar_model::train::Davis;
 
+    const SECOND_NS: i64 = 1_000_000_000;
+
+    /// A train that coasts.
+    fn coasting(time_ns: i64, speed_mps: f64) -> UnitSample {
+        UnitSample {
+            time_ns,
+            segment: 1,
+            speed_mps,
+            driving: 0.0,
+            traction: 0.0,
+            brake: 0.0,
+            known: 0.0,
+            inertia: 108.0,
+        }
+    }
+
     /// Variance of the impulse over 20 s by where on the line a gradient changes by 6 ‰ under a train of
     /// 100 m, which passes it at 20 m/s.
     fn place_variance(rate_hz: i64, position_noise_m: f64) -> f64 {
@@ -224,16 +277,7 @@ mod tests {
             let time_s = k as f64 / rate_hz as f64;
             let noise_m = if k % 2 == 0 { position_noise_m } else { -position_noise_m };
             let under_m = (20.0 * (time_s - 5.0) + noise_m).clamp(0.0, 100.0);
-            UnitSample {
-                time_ns: k * 1_000_000_000 / rate_hz,
-                segment: 1,
-                speed_mps: 20.0,
-                driving: 0.0,
-                traction: 0.0,
-                brake: 0.0,
-                known: 0.06 * under_m,
-                inertia: 108.0,
-            }
+            UnitSample { known: 0.06 * under_m, ..coasting(k * SECOND_NS / rate_hz, 20.0) }
         };
         steps.see(&sample(0));
         let of_step = |k: i64| {
@@ -252,18 +296,8 @@ mod tests {
         let variance = |c: f64, speed_mps: f64| {
             let resistance = ResistanceBelief::declared(&Davis { a: 1.5, b: 0.02, c }, 0.4);
             let learned = LearnedState::new(&settings, &resistance);
-            let sample = |time_ns: i64| UnitSample {
-                time_ns,
-                segment: 1,
-                speed_mps,
-                driving: 0.0,
-                traction: 0.0,
-                brake: 0.0,
-                known: 0.0,
-                inertia: 108.0,
-            };
             let mut steps = StepBuilder::new(&settings, 100.0);
-            let (from, to) = (sample(0), sample(100_000_000));
+            let (from, to) = (coasting(0, speed_mps), coasting(SECOND_NS / 10, speed_mps));
             steps.see(&from);
             steps.see(&to);
             steps
@@ -273,6 +307,42 @@ mod tests {
         // Gusts of 1 m/s for 10 s each: 2 c v, over 0.1 s of independent ones.
         assert!((variance(0.001, 30.0) - 0.06_f64.powi(2) * 2.0 * 10.0 * 0.1).abs() < 1e-9);
         assert!((variance(0.002, 15.0) - variance(0.001, 30.0)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_error_of_the_map_stays_where_the_train_stands_and_is_another_one_elsewhere() {
+        let begun = |between: &[UnitSample]| {
+            let mut steps = StepBuilder::new(&TrainKalmanSettings::default(), 800.0);
+            let sample = ResolvedSample::coasting();
+            let first = steps.begin(&sample);
+            assert_eq!((first.kept, first.std_permille), (0.0, 0.05), "half of it under 800 m");
+            steps.see(&coasting(0, 1.0));
+            steps.begin(&sample);
+            between.iter().for_each(|it| steps.see(it));
+            steps.begin(&sample).kept
+        };
+        assert_eq!(begun(&[coasting(60 * SECOND_NS, 0.0)]), 1.0);
+        let unseen = begun(&[coasting(20 * SECOND_NS, 20.0)]);
+        assert!((unseen - gradient_error_kept(100.0)).abs() < 1e-12, "{unseen}");
+        assert_eq!(begun(&[UnitSample { segment: 2, ..coasting(SECOND_NS, 1.0) }]), 0.0);
+    }
+
+    #[test]
+    fn a_brake_whose_report_fades_before_the_stop_may_act_until_the_train_is_driven() {
+        let resistance = ResistanceBelief::declared(&Davis { a: 1.5, b: 0.02, c: 0.001 }, 0.4);
+        let learned = LearnedState::new(&TrainKalmanSettings::default(), &resistance);
+        // The standard deviation of the brake force 10 s after the end of its report.
+        let std = |speed_mps: f64, traction: f64| {
+            let mut steps = StepBuilder::new(&TrainKalmanSettings::default(), 100.0);
+            steps.see(&UnitSample { brake: 30.0, ..coasting(0, speed_mps) });
+            let after = |k: i64| UnitSample { traction, ..coasting(k * SECOND_NS / 10, speed_mps) };
+            (1..=100).for_each(|k| steps.see(&after(k)));
+            let at = (&after(99), &after(100));
+            let step = steps.to(at, &ResolvedSample::coasting(), (0.0, &learned), &resistance);
+            step.brake_std / step.duration_s
+        };
+        assert!((std(3.0, 0.0) - 30.0).abs() < 1e-9);
+        assert!(std(3.0, 5.0) < 0.1 && std(8.0, 0.0) < 0.1);
     }
 
     #[test]
