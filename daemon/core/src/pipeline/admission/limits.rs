@@ -148,7 +148,8 @@ mod tests {
                 Consequence::Doubted(reason) => reason.name(),
             };
             let Limit { of, low, high, false_alarm, .. } = limit;
-            let row = format!("| `{name}` | {of} | {low} to {high} | {false_alarm:e} |");
+            let often = if *false_alarm > 0.0 { format!("{false_alarm:e}") } else { "0".into() };
+            let row = format!("| `{name}` | {of} | {low} to {high} | {often} |");
             assert!(decision.contains(&row), "{row}");
         }
     }
