@@ -3,7 +3,7 @@
 use nalgebra::{Matrix4, Vector3, Vector4};
 
 use super::motion_filter::{
-    BEHAVIOURS, BRAKE_ERROR, DISTURBANCE, FilterStep, LOAD, MAP_ERROR, MapError, MotionFilter,
+    BEHAVIOURS, BRAKE_ERROR, DISTURBANCE, FilterStep, LOAD, MAP_ERROR, MapErrorStep, MotionFilter,
     MotionState, RESISTANCE, SPEED, STATES, StateCovariance, WIND, behaviours,
 };
 use crate::filter::bank::{Bank, Mixture};
@@ -96,7 +96,7 @@ impl MotionBank {
 
     /// Begins a motion at a measured speed with the variance of its noise, after a time in s without a sight of it, of
     /// whose wind and error of the map so much is left.
-    pub fn begin(&mut self, speed: (f64, f64), gap_s: f64, wind: (f64, f64), map: &MapError) {
+    pub fn begin(&mut self, speed: (f64, f64), gap_s: f64, wind: (f64, f64), map: &MapErrorStep) {
         for Rival { filter, outliers } in self.rivals.hypotheses_mut() {
             *outliers = OutlierRow::default();
             filter.belief.replace(SPEED, speed.0, speed.1);

@@ -66,7 +66,7 @@ pub enum Following {
 
 /// Error of the map's gradient under the train after a distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MapError {
+pub struct MapErrorStep {
     /// Standard deviation in ‰, as surveyed or as the settings have it.
     pub std_permille: f64,
     /// Share of the error that is still there.
@@ -107,7 +107,7 @@ pub struct FilterStep {
     /// 1 along growing chainage, else -1.
     pub direction: f64,
     /// The map's error.
-    pub map_error: MapError,
+    pub map_error: MapErrorStep,
     /// Variance in (N/kN)² that comes to each coefficient of the resistance.
     pub drift_variance: f64,
     /// Addition of 1 m/s of wind along the line in N/kN. It uses the declared air resistance: with the one learned
@@ -205,7 +205,7 @@ impl MotionFilter {
     }
 
     /// Passes a distance of the line.
-    pub fn pass(&mut self, map: &MapError) {
+    pub fn pass(&mut self, map: &MapErrorStep) {
         let renewed = 1.0 - map.kept * map.kept;
         let square = self.behaviour.map_std_permille.powi(2) + map.std_permille.powi(2);
         self.belief.fade(MAP_ERROR, map.kept, square * renewed);
@@ -289,7 +289,7 @@ mod tests {
             jump_share: 0.0,
             force_rate: 0.0,
             direction: -1.0,
-            map_error: MapError { std_permille: 0.0, kept: 1.0 },
+            map_error: MapErrorStep { std_permille: 0.0, kept: 1.0 },
             drift_variance: 0.0,
             by_wind: 0.07,
             by_wind_square: 0.002,

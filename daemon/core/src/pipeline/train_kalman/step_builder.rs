@@ -8,7 +8,7 @@ use super::TrainKalmanSettings;
 use super::brake_errors::BrakeErrors;
 use super::force_history::ForceHistory;
 use super::learned_state::{LearnedState, ResistanceBelief};
-use super::motion_filter::{FilterStep, Following, MapError, wind_over};
+use super::motion_filter::{FilterStep, Following, MapErrorStep, wind_over};
 use crate::pipeline::momentum::UnitSample;
 
 /// How long a change of force is remembered, in s.
@@ -153,7 +153,7 @@ impl StepBuilder {
     }
 
     /// Begins a motion, and returns the map's error since the one before.
-    pub fn begin(&mut self, sample: &ResolvedSample) -> MapError {
+    pub fn begin(&mut self, sample: &ResolvedSample) -> MapErrorStep {
         (self.force_rate, self.known_rate) = (0.0, 0.0);
         self.map_error(self.unseen_m, sample)
     }
@@ -164,11 +164,11 @@ impl StepBuilder {
     }
 
     /// Returns the map's error after a distance in m.
-    fn map_error(&mut self, travelled_m: f64, sample: &ResolvedSample) -> MapError {
+    fn map_error(&mut self, travelled_m: f64, sample: &ResolvedSample) -> MapErrorStep {
         self.unseen_m = 0.0;
         let surveyed = sample.gradient_std_permille;
         let declared = self.map_share * self.settings.gradient_std_permille;
-        MapError {
+        MapErrorStep {
             std_permille: if surveyed > 0.0 { surveyed } else { declared },
             // The smaller a mean's error, the longer it stays.
             kept: gradient_error_kept(travelled_m * self.map_share.powi(2)),
