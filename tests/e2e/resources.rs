@@ -159,7 +159,7 @@ fn the_limit_of_open_files_is_raised_and_its_end_is_named_once() {
         || format!("the cause: {}", scarce.errors()),
     );
     std::thread::sleep(std::time::Duration::from_secs(2));
-    // What it ends, a kept state too where the readers were faster, is named once each.
+    // The limit may end a kept state, too, where the readers were faster.
     let said = scarce.errors();
     let causes: Vec<&str> = said
         .lines()
