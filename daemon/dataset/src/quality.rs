@@ -261,7 +261,7 @@ pub(super) struct Judge {
 }
 
 impl Judge {
-    /// Returns nothing seen yet of a run.
+    /// Returns a judge that has seen no sample of its run.
     pub fn new(context: Context, is_position_recorded: bool) -> Self {
         let mut admission = Admission::new(DATASET_TRAIN, context.train.clone());
         admission.set_position_measured(is_position_recorded);

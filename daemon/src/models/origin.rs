@@ -19,7 +19,7 @@ pub struct ModelFigure {
 }
 
 impl ModelFigure {
-    /// Returns the half the width of the 95 % interval.
+    /// Returns half the width of the 95 % interval.
     pub fn half_width(self) -> f64 {
         HALF_95 * self.std
     }

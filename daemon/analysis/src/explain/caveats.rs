@@ -70,7 +70,7 @@ fn small_beside(outcome: &SearchOutcome, effects: &[EffectAnswer]) -> String {
     format!(" Certain, small, and part of the updated model: {}.", small.join(", "))
 }
 
-/// Returns that the runs held out are predicted worse with the findings; empty when they are not.
+/// States that the runs held out are predicted worse with the findings; empty when they are not.
 fn worse_held_out(effects: &[EffectAnswer], score: &PredictionScore) -> String {
     let Some(judged) = score.judged() else { return String::new() };
     let [before, after] = judged.error_mps;

@@ -9,7 +9,7 @@ use super::score::predicted;
 use crate::statistics::rms;
 
 impl EffectMeaning {
-    /// Returns that of one effect of a fitted model; `rest` is the model refitted without it.
+    /// Returns the meaning of one effect of a fitted model; `rest` is the model refitted without it.
     pub fn new(problem: &FitProblem, fit: &Fit, index: usize, rest: &Fit) -> Self {
         let (mut effect_j, mut traction_j, mut distance_m) = (0.0, 0.0, 0.0);
         for run in &problem.runs {

@@ -41,7 +41,7 @@ pub struct MeasuredResponse {
 }
 
 impl MeasuredResponse {
-    /// Returns that of some stops, each by the time it loses and the moment of that loss, as a ramp has them.
+    /// Returns the response over some stops, each by the time it loses and the moment of that loss, as a ramp has them.
     fn from_points(built: &[(&DecelerationCurve, &DecelerationPoint)]) -> Self {
         let count = built.len() as f64;
         let losses: Vec<[f64; 2]> = built.iter().map(|(curve, from)| lost(curve, from)).collect();

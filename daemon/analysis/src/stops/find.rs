@@ -263,7 +263,7 @@ pub struct CutOff {
 }
 
 impl CutOff {
-    /// Returns that of some times; `None` without one.
+    /// Returns the cut-off from the times in s at some stops; `None` without one.
     pub fn from_times(times_s: impl Iterator<Item = f64> + Clone) -> Option<Self> {
         let [least_s, greatest_s] = span(times_s.clone())?;
         Some(CutOff { stops: times_s.count(), least_s, greatest_s })

@@ -94,7 +94,7 @@ pub struct Facts {
 const FALLING_MIN: usize = 20;
 
 impl Facts {
-    /// Returns nothing seen yet.
+    /// Returns the facts before any cell is seen.
     pub fn new() -> Self {
         let (min, max) = (f64::INFINITY, f64::NEG_INFINITY);
         Facts { min, max, last: f64::NAN, packed: Some(Packed::NEW), ..Facts::default() }

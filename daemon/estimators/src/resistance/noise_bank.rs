@@ -265,7 +265,7 @@ impl NoiseBank {
         &self.models.hypotheses()[0]
     }
 
-    /// Returns, from time to time, the part of the priors that forgetting has removed.
+    /// Adds, from time to time, the part of the priors that forgetting has removed.
     fn renew_penalty(&mut self) {
         self.rows_since_renewal += 1;
         if self.forgetting < 1.0 && self.rows_since_renewal == RENEWAL_ROWS {

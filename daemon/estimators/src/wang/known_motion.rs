@@ -115,7 +115,7 @@ pub struct Inertia {
 }
 
 impl Inertia {
-    /// Returns that of a train.
+    /// Returns the inertia of a train as declared.
     pub fn from_train(train: &TrainModel) -> Self {
         let TrainModel { mass_kg, rotating_mass_factor, .. } = *train;
         Inertia { reference_mass_kg: mass_kg, rotating_mass_factor }

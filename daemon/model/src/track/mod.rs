@@ -392,7 +392,7 @@ pub struct MassSection {
 }
 
 impl MassSection {
-    /// Returns true at a chainage in m in a direction of travel.
+    /// Returns whether a chainage in m in a direction of travel lies within.
     #[inline]
     pub fn holds(&self, centre_m: f64, direction: f64) -> bool {
         self.direction == direction && (self.from_m..self.to_m).contains(&centre_m)

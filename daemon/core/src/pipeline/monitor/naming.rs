@@ -77,7 +77,7 @@ pub struct Naming {
     named: Option<Named>,
     /// Who leads, and for how many blocks.
     leading: (Option<usize>, u32),
-    /// Returns the evidence that the cause of the named effect has ended.
+    /// Evidence that the cause of the named effect has ended.
     ending: f64,
     /// Brakes lately that were suspected and let go while the train drove.
     let_go: f64,

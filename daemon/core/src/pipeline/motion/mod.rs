@@ -198,7 +198,7 @@ impl StopWatch {
         StopWatch { stop_min_ns, last: None, standing_since_ns: None, is_due: false }
     }
 
-    /// Returns true before the first sample.
+    /// Returns whether no sample has come yet.
     pub fn is_first(&self) -> bool {
         self.last.is_none()
     }
