@@ -18,6 +18,9 @@ use super::evidence::{
 use super::hypothesis::{Hypothesis, On, Past};
 use crate::parallel;
 
+/// Motion in s under a force without which nothing is learned of the force.
+const FORCE_MIN_S: f64 = 30.0;
+
 /// Inner products of a whitened regressor.
 #[derive(Clone, Debug)]
 pub struct Tuple {
@@ -99,6 +102,30 @@ impl<'a> Scan<'a> {
             }
         }
         total_s
+    }
+
+    /// Returns whether the runs hold enough motion under a force, in N, that acts above zero.
+    ///
+    /// # Errors
+    ///
+    /// Where they hold less, with the force's `name`.
+    pub fn requires_force(
+        &self,
+        force_n: fn(&ResolvedSample) -> Option<f64>,
+        name: &str,
+    ) -> Result<(), String> {
+        let acting_s = self.seconds_where(|_, sample| force_n(sample).is_some_and(|n| n > 0.0));
+        match acting_s < FORCE_MIN_S {
+            true => Err(format!("the runs hold hardly any {name}")),
+            false => Ok(()),
+        }
+    }
+
+    /// Returns whether another inertia and a scale of the traction force look alike: without braking only gradients
+    /// separate them, and an accelerometer feels these in one reading with the acceleration, at an unknown scale.
+    pub fn are_inertia_and_traction_alike(&self) -> bool {
+        self.problem.runs.iter().all(|run| run.is_gradient_felt)
+            && self.requires_force(|sample| sample.brake_force_n, "braking").is_err()
     }
 
     /// Returns the tuple of a force shape over all runs: `acceleration(run, sample)` in m/s² per unit.

@@ -25,6 +25,10 @@ pub const ERROR_PARAMETER: Parameter = Parameter::new("permille", (-150.0, 150.0
 /// A root mean square in ‰ below this is what good surveys differ by.
 pub const ERROR_LEAST_PERMILLE: f64 = 0.25;
 
+/// Standard deviation of the scale of gradients that an accelerometer feels: the pitch of a body that accelerates,
+/// the sensor's scale and its noise all change how much of a gradient is seen.
+pub const FELT_USUAL_STD: f64 = 0.2;
+
 /// The gradient is steeper in ‰ along growing chainage by what an error says.
 #[inline]
 pub fn err(error: &GradientError, (position_m, direction): (f64, f64), permille: &mut f64) {

@@ -37,10 +37,7 @@ pub const OF_BRAKE: Policy =
 
 /// Proposes a delay of the brake alone.
 pub fn of_brake(scan: &Scan) -> Proposal {
-    let braking_s = scan.seconds_where(|_, sample| sample.brake_force_n.is_some_and(|n| n > 0.0));
-    if braking_s < 30.0 {
-        return Err("the runs hold hardly any braking".into());
-    }
+    scan.requires_force(|sample| sample.brake_force_n, "braking")?;
     Ok(vec![candidate(scan, DelayAndLag { late: Late::Brake, may_be_speed: false })])
 }
 

@@ -1,6 +1,5 @@
 //! A reported force that is not the true one, traction or brake: gain = reported over true.
 
-use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::{Key, brake, traction};
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -10,7 +9,10 @@ use crate::explain::scan::Scan;
 
 #[derive(Clone, Copy, Debug)]
 enum Gain {
-    Traction,
+    Traction {
+        /// Whether the runs show no difference from another inertia.
+        is_like_inertia: bool,
+    },
     Brake,
 }
 
@@ -30,25 +32,18 @@ pub const OF_BRAKE: Policy = Policy {
 
 /// Proposes a gain of the traction force.
 pub fn of_traction(scan: &Scan) -> Proposal {
-    proposed(scan, Gain::Traction, |sample| sample.traction_force_n, "traction")
+    scan.requires_force(|sample| sample.traction_force_n, "traction")?;
+    let is_like_inertia = scan.are_inertia_and_traction_alike();
+    if is_like_inertia && scan.fit.model.has(EffectKind::RotatingMass) {
+        return Err("beside another rotating mass only braking or a known gradient shows it".into());
+    }
+    Ok(vec![Candidate::new(Gain::Traction { is_like_inertia }, vec![1.0])])
 }
 
 /// Proposes a gain of the brake force.
 pub fn of_brake(scan: &Scan) -> Proposal {
-    proposed(scan, Gain::Brake, |sample| sample.brake_force_n, "braking")
-}
-
-fn proposed(
-    scan: &Scan,
-    gain: Gain,
-    force_n: fn(&ResolvedSample) -> Option<f64>,
-    what: &str,
-) -> Proposal {
-    let acting_s = scan.seconds_where(|_, sample| force_n(sample).is_some_and(|n| n > 0.0));
-    if acting_s < 30.0 {
-        return Err(format!("the runs hold hardly any {what}"));
-    }
-    Ok(vec![Candidate::new(gain, vec![1.0])])
+    scan.requires_force(|sample| sample.brake_force_n, "braking")?;
+    Ok(vec![Candidate::new(Gain::Brake, vec![1.0])])
 }
 
 impl Hypothesis for Gain {
@@ -56,7 +51,7 @@ impl Hypothesis for Gain {
         const TRACTION: &[&Key] = &[&traction::GAIN];
         const BRAKE: &[&Key] = &[&brake::GAIN];
         let (kind, keys, least) = match self {
-            Gain::Traction => (EffectKind::TractionGain, TRACTION, traction::LEAST),
+            Gain::Traction { .. } => (EffectKind::TractionGain, TRACTION, traction::LEAST),
             Gain::Brake => (EffectKind::BrakeGain, BRAKE, brake::GAIN_LEAST),
         };
         Nature {
@@ -68,10 +63,17 @@ impl Hypothesis for Gain {
         }
     }
 
+    fn twins(&self, _parameters: &[f64]) -> &'static [EffectKind] {
+        match self {
+            Gain::Traction { is_like_inertia: true } => &[EffectKind::RotatingMass],
+            _ => &[],
+        }
+    }
+
     fn apply(&self, parameters: &[f64], _on: On, forces: &mut [SampleForces]) {
         for force in forces {
             let reported_n = match self {
-                Gain::Traction => &mut force.traction_n,
+                Gain::Traction { .. } => &mut force.traction_n,
                 Gain::Brake => &mut force.brake_n,
             };
             *reported_n = traction::true_force_n(*reported_n, parameters[0]);

@@ -30,6 +30,8 @@ pub enum DeclaredFigure {
     /// By so much of the rotating-mass factor: seldom weighed, the same in every run, and for the motion a scale
     /// of all that acts, gradients among it, as a wheel's is.
     RotatingMass,
+    /// By a share of the gradient that an accelerometer feels.
+    FeltGradient,
 }
 
 /// An error of declared figures that every railway has.

@@ -11,6 +11,8 @@ use crate::explain::scan::Scan;
 #[derive(Debug)]
 struct Gamma {
     declared: f64,
+    /// Whether the runs show no difference from a scale of the traction force.
+    is_like_traction: bool,
 }
 
 /// It estimates a figure that is usually a little wrong.
@@ -19,7 +21,13 @@ pub const POLICY: Policy = Policy { frees: &[DeclaredFigure::RotatingMass], ..Po
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     let declared = scan.train.rotating_mass_factor;
-    Ok(vec![Candidate::new(Gamma { declared }, vec![declared])])
+    let is_like_traction = scan.are_inertia_and_traction_alike();
+    if is_like_traction && scan.fit.model.has(EffectKind::TractionGain) {
+        return Err(
+            "beside a scale of the traction force only braking or a known gradient shows it".into(),
+        );
+    }
+    Ok(vec![Candidate::new(Gamma { declared, is_like_traction }, vec![declared])])
 }
 
 impl Hypothesis for Gamma {
@@ -38,6 +46,10 @@ impl Hypothesis for Gamma {
 
     fn scale_of_others(&self, parameters: &[f64]) -> f64 {
         (1.0 + self.declared) / (1.0 + parameters[0])
+    }
+
+    fn twins(&self, _parameters: &[f64]) -> &'static [EffectKind] {
+        if self.is_like_traction { &[EffectKind::TractionGain] } else { &[] }
     }
 
     fn apply(&self, parameters: &[f64], _on: On, forces: &mut [SampleForces]) {

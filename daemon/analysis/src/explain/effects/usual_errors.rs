@@ -3,7 +3,7 @@
 //! model is fitted, with them included.
 
 use dynocar_model::terms::extra::Covariate;
-use dynocar_model::terms::{Parameter, bearings, curve, delay, rotating, traction};
+use dynocar_model::terms::{Parameter, bearings, curve, delay, gradient, rotating, traction};
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{DMatrix, DVector};
 
@@ -14,13 +14,14 @@ use super::{
 use crate::explain::evidence::{RunData, SampleForces};
 
 /// Figures that are usually a little wrong, with the standard deviations of their errors.
-const FIGURES: [(DeclaredFigure, f64); 6] = [
+const FIGURES: [(DeclaredFigure, f64); 7] = [
     (DeclaredFigure::Traction, traction::USUAL_STD),
     (DeclaredFigure::Brake, traction::USUAL_STD),
     (DeclaredFigure::Lateness, delay::USUAL_STD_S),
     (DeclaredFigure::Curves, curve::USUAL_STD),
     (DeclaredFigure::Warming, bearings::USUAL_STD),
     (DeclaredFigure::RotatingMass, rotating::USUAL_STD),
+    (DeclaredFigure::FeltGradient, gradient::FELT_USUAL_STD),
 ];
 /// Bounds of the search, in standard deviations, and the step of differences.
 const BEYOND: f64 = 10.0;
@@ -82,6 +83,9 @@ impl Hypothesis for UsualErrors {
                 }
                 DeclaredFigure::RotatingMass => {
                     forces.iter_mut().for_each(|it| it.rotating_mass_factor += error);
+                }
+                DeclaredFigure::FeltGradient => {
+                    forces.iter_mut().for_each(|it| it.gradient_permille *= 1.0 + error);
                 }
                 DeclaredFigure::Warming => {
                     let delta_a = error * self.a_n_per_kn;

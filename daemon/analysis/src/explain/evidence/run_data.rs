@@ -9,7 +9,9 @@ use dynocar_model::terms::extra::Covariate;
 use dynocar_model::train::{Corrections, TrainModel};
 use dynocar_shared::{SampleField, TrainSample};
 
-use crate::dataset::{DATASET_TRAIN, Dataset, ForceSource, PositionSource, Role, Run};
+use crate::dataset::{
+    DATASET_TRAIN, Dataset, ForceSource, GradientSource, PositionSource, Role, Run,
+};
 use crate::statistics::span;
 
 use super::bins::{self, Bin};
@@ -56,6 +58,8 @@ pub struct RunData {
     pub speed_late_s: Vec<f64>,
     /// False where positions are integrated from the speed.
     pub is_position_recorded: bool,
+    /// True where gradients come from an accelerometer, which feels them together with the acceleration.
+    pub is_gradient_felt: bool,
     /// The power from which the force comes.
     pub power: Option<RunPower>,
     /// Samples that validation refused.
@@ -293,6 +297,7 @@ fn prepare_run(
         distance_ratio,
         speed_late_s,
         is_position_recorded,
+        is_gradient_felt: run.gradient_source == GradientSource::SpecificForce,
         power,
         rejected,
         replaced,

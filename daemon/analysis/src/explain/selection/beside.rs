@@ -19,8 +19,8 @@ use super::refusal::Refusal;
 use super::search::Search;
 use super::trying::{Asked, PROMISE_TIMES};
 use crate::explain::effects::{
-    Candidate, USUAL_LENGTH_M, map_error, map_error_as_fitted, policy_of, usual_errors,
-    vertical_curves,
+    Candidate, DeclaredFigure, USUAL_LENGTH_M, map_error, map_error_as_fitted, policy_of,
+    usual_errors, vertical_curves,
 };
 use crate::explain::evidence::Fit;
 use crate::explain::places::SURVEYED;
@@ -31,6 +31,17 @@ pub fn is_certain_beside(trial: &EffectTrial, evidence: f64) -> bool {
     is_material(trial)
         && is_possible(trial)
         && is_certain(&trial.fit, trial.last(), evidence, trial.reduction, true)
+}
+
+/// Returns the declared figures that the effects of a model estimate: their own, and those of kinds that the runs
+/// cannot distinguish from them.
+fn freed_figures(fit: &Fit) -> impl Iterator<Item = &'static DeclaredFigure> {
+    let effects = fit.model.effects.iter().enumerate();
+    let kinds = effects.flat_map(|(index, effect)| {
+        let twins = effect.twins(fit.effect_parameters(index));
+        twins.iter().copied().chain([effect.kind()])
+    });
+    kinds.flat_map(|kind| policy_of(kind).frees)
 }
 
 /// Times at most that the length over which steps are rounded is found again, and the share by which what it changes
@@ -47,9 +58,13 @@ impl Search<'_> {
         {
             return beside.clone();
         }
-        let frees = |kind: EffectKind| policy_of(kind).frees;
-        let freed: Vec<_> = fit.model.effects.iter().flat_map(|it| frees(it.kind())).collect();
-        let usual = usual_errors(fit.theta[0], |figure| !freed.contains(&&figure));
+        let freed: Vec<_> = freed_figures(fit).collect();
+        let is_felt = self.problem.runs.iter().any(|run| run.is_gradient_felt);
+        let is_usual = |figure: DeclaredFigure| match figure {
+            DeclaredFigure::FeltGradient => is_felt,
+            _ => !freed.contains(&&figure),
+        };
+        let usual = usual_errors(fit.theta[0], is_usual);
         let shared = usual.start.len();
         let map_errors = self.map_errors(fit);
         let rounded = map_errors.len().checked_sub(1).map(|last| fit.model.effects.len() + last);
