@@ -153,8 +153,8 @@ impl Bound {
         self.sensitivity[place] += change_mps;
     }
 
-    /// Loads so far. Nobody knows that one stays at a stop, unless the mass is exact: a weighing that did not change may
-    /// be off by as much as any other.
+    /// Returns the number of loads so far. Unless the mass is exact, each stop counts as a new load: an unchanged
+    /// weighing may be as wrong as any other.
     fn loads(&self, world: &World) -> usize {
         if world.scenario.load == LoadSource::Exact { 0 } else { self.stops }
     }
