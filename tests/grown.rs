@@ -1,4 +1,4 @@
-//! Additions of docs/walkthrough.md at work: tests/growth.py runs this where they have been made.
+//! Tests of the additions of docs/walkthrough.md; tests/growth.py runs them in a copy that has these additions.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use dynocar_shared::{Parameter, PipelineKind, SampleField, Status, TrainId, Trai
 
 const TRAIN: &str = "[train]\nmass_t = 200\nlength_m = 100\nrotating_mass_factor = 0.06\n\
                      [resistance]\na = 1.5\nb = 0.01\nc = 0.0005\n";
-/// The form of a drag while the train is neither pulled nor braked.
+/// The form of a drag that acts while there is neither traction nor braking.
 const DRAG: &str = "[[extra.factor]]\nof = \"traction_force_n\"\nform = \"up_to\"\nto = 500\n\
     [[extra.factor]]\nof = \"brake_force_n\"\nform = \"up_to\"\nto = 500\n";
 const TRACK: &str = "[track]\nlength_m = 40000\ngradient = [[0.0, 0.0], [3000.0, 4.0], [5000.0, -3.0], \
@@ -22,7 +22,7 @@ const TRACK: &str = "[track]\nlength_m = 40000\ngradient = [[0.0, 0.0], [3000.0,
 const STEP_S: f64 = 0.5;
 const RUNS: usize = 4;
 
-/// Returns the traction and brake force in N of a run after some steps: pulled, coasting and braked in turn.
+/// Returns the traction and brake force in N of a run after some steps: traction, coasting and braking in turn.
 fn forces_n(number: usize, step: u32) -> [f64; 2] {
     let lap_s = 200.0 + 10.0 * number as f64;
     match STEP_S * f64::from(step) % lap_s {

@@ -1,4 +1,4 @@
-//! Accuracy of the model of brake components, and the number of plain draws that its tilted ones are worth.
+//! Accuracy of the model of brake components, and the number of plain Monte Carlo draws as accurate as one tilted draw.
 
 use std::time::Instant;
 
@@ -26,9 +26,9 @@ pub struct BrakesBenchArguments {
     output: OutputArguments,
 }
 
-/// Share of the stops that are weaker.
+/// Share of the stops with weaker brakes than the computed strength.
 const PROBABILITY: f64 = 1e-6;
-/// Answers of several seeds: their mean, their variance, and the time of one in s.
+/// Answers of several seeds: their mean, their variance, and the time of one answer in s.
 struct Answers {
     mean: f64,
     variance: f64,

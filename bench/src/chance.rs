@@ -15,17 +15,17 @@ impl Chance {
         Chance(ChaCha8Rng::seed_from_u64(seed))
     }
 
-    /// Uniform from 0 to 1.
+    /// Returns a number drawn uniformly from 0 to 1.
     pub fn uniform(&mut self) -> f64 {
         self.0.random()
     }
 
-    /// Uniform from -1 to 1.
+    /// Returns a number drawn uniformly from -1 to 1.
     pub fn either_way(&mut self) -> f64 {
         2.0 * self.uniform() - 1.0
     }
 
-    /// Returns the standard normal.
+    /// Returns a number drawn from the standard normal distribution.
     pub fn normal(&mut self) -> f64 {
         let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
         radius * (std::f64::consts::TAU * self.uniform()).cos()

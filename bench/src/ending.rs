@@ -1,5 +1,5 @@
-//! Ctrl-C: a command finishes its present work, gives its results so far, and ends with [`STATUS`]; a second one ends
-//! it at once.
+//! Ctrl-C: a command finishes its present work, gives its results so far, and ends with [`STATUS`]; a second Ctrl-C
+//! ends it at once.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -9,7 +9,7 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 
 use crate::output::BenchError;
 
-/// Exit status of a command that was ended, whatever it gave: that of a program that SIGINT ends.
+/// Exit status of a command that a signal ended, with or without results: the status of a program that SIGINT ends.
 pub const STATUS: u8 = 130;
 
 static FLAG: OnceLock<Arc<AtomicBool>> = OnceLock::new();

@@ -7,7 +7,7 @@
 //! - `explain`: the search for undeclared effects on simulated datasets
 //! - `latency`: sample → snapshot through real processes, compared with the floor and alternatives
 //! - `load`: many trains against one daemon
-//! - `open_loop`: the open loop of the two
+//! - `open_loop`: the open loop of `latency` and `load`
 //! - `rig`: processes, cores, pipelines and histograms
 //! - `monitor`: suspicions of the residual monitor on simulated driving, their delay and false alarms
 //! - `papers`: accuracy of every estimator over seeded runs, compared with the statistical bound

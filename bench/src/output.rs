@@ -9,7 +9,7 @@ use clap::Args;
 use serde::{Serialize, Serializer};
 use serde_json::Value;
 
-/// Why a command fails, in words; exit status 1, or 2 for [`Usage`].
+/// Cause of a command's failure, in words; exit status 1, or 2 for [`Usage`].
 pub type BenchError = Box<dyn Error + Send + Sync>;
 
 /// A mistake on the command line, with the expected form: exit status 2.
@@ -56,7 +56,7 @@ pub fn containing<T>(
     Ok(all)
 }
 
-/// Says during what an error happened.
+/// Returns a function that puts the work during which an error happened before its message.
 pub fn during<E: Display>(what: impl Display) -> impl FnOnce(E) -> BenchError {
     move |error| format!("{what}: {error}").into()
 }
@@ -84,7 +84,7 @@ impl OutputArguments {
     }
 }
 
-/// Fails with what went wrong, if anything did, line by line under what it is.
+/// Fails with these lines under a heading, if there are any.
 ///
 /// # Errors
 ///
@@ -96,7 +96,7 @@ pub fn expect_none(what: &str, lines: Vec<String>) -> Result<(), BenchError> {
     }
 }
 
-/// A cell of a table: its column, what people read there, where it is for them, and what machines get.
+/// A cell of a table: its column, its text where people see it, and its value for machines.
 #[derive(Clone, Debug)]
 struct Cell {
     name: String,
@@ -104,7 +104,7 @@ struct Cell {
     value: Value,
 }
 
-/// A row of a table of figures, empty where there is none: for people, as CSV, and as JSON with the column's names.
+/// A row of a table of figures, for people, as CSV, and as JSON with the names of the columns.
 #[derive(Clone, Debug, Default)]
 pub struct Record(Vec<Cell>);
 

@@ -4,8 +4,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::ending;
 
-/// Does `work` on every case on `threads` threads, which leave those of rayon to the work; gives the results
-/// in the order of the cases.
+/// Does `work` on every case on `threads` threads of its own, so that the work may use the threads of rayon; returns
+/// the results in the order of the cases.
 ///
 /// # Panics
 ///
@@ -18,7 +18,7 @@ pub fn over<C: Sync, R: Send>(
     over_while(cases, threads, work, || true)
 }
 
-/// Returns the same with the first of the cases, until the command is to end.
+/// Does the same until the command is to end; returns the results of the first cases.
 ///
 /// # Panics
 ///

@@ -5,7 +5,7 @@ use std::borrow::Borrow;
 /// m/s of one km/h.
 pub const KMH: f64 = 1.0 / 3.6;
 
-/// Arithmetic mean; 0 of none.
+/// Returns the arithmetic mean; 0 for no values.
 pub fn mean(values: impl IntoIterator<Item: Borrow<f64>>) -> f64 {
     let (mut sum, mut count) = (0.0, 0);
     for value in values {
@@ -15,17 +15,17 @@ pub fn mean(values: impl IntoIterator<Item: Borrow<f64>>) -> f64 {
     if count == 0 { 0.0 } else { sum / f64::from(count) }
 }
 
-/// Returns the share of what is so; 0 of none.
+/// Returns the share of true values; 0 for no values.
 pub fn share(are_so: impl IntoIterator<Item = bool>) -> f64 {
     mean(are_so.into_iter().map(|is_so| f64::from(u8::from(is_so))))
 }
 
-/// Returns the root mean square; 0 of none.
+/// Returns the root mean square; 0 for no values.
 pub fn root_mean_square(values: impl IntoIterator<Item: Borrow<f64>>) -> f64 {
     mean(values.into_iter().map(|value| value.borrow() * value.borrow())).sqrt()
 }
 
-/// The values that these shares of all do not exceed; none of none.
+/// Returns the values that these shares of all values do not exceed; `None` for no values.
 pub fn quantiles<const N: usize>(mut values: Vec<f64>, shares: [f64; N]) -> Option<[f64; N]> {
     values.sort_by(f64::total_cmp);
     let last = values.len().checked_sub(1)? as f64;
@@ -45,8 +45,8 @@ pub fn straight_line(points: &[(f64, f64)]) -> (f64, f64) {
     (mean_y - slope * mean_x, slope)
 }
 
-/// Derivatives of every element of a list with respect to each parameter, by central differences of these widths:
-/// of what a scenario's own motion gives, apart from the derivatives that estimators use.
+/// Derivatives of every element of a list with respect to each parameter, by central differences of these widths: from
+/// the motion of a scenario, independently of the derivatives that estimators use.
 pub fn jacobian<const N: usize>(
     widths: [f64; N],
     at: impl Fn([f64; N]) -> Vec<f64>,

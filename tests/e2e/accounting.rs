@@ -1,5 +1,5 @@
-//! `offered = used + rejected + lost` for every pipeline, from a controller's first sample to its
-//! last, whoever comes late, dies or is stopped meanwhile.
+//! `offered = used + rejected + lost` for every pipeline, from a controller's first sample to its last, even if a
+//! process starts late, dies or is stopped meanwhile.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -1,4 +1,4 @@
-//! Models on trial, adopted and taken back while the train runs: nothing restarts, nothing is lost.
+//! Models on trial, adopted and taken back while the train runs: no process restarts, no sample is lost.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
@@ -19,7 +19,7 @@ use rustix::process::Signal;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 const TRAIN: TrainId = TrainId(1);
-/// The demo's declared a, and one that is plainly wrong.
+/// The demo's declared coefficient a, and a clearly wrong one.
 const RIGHT: &str = "a = 1.498";
 const WRONG: &str = "a = 4.5";
 

@@ -1,5 +1,5 @@
-//! Every pipeline under every failure of its sensors, at rates from one in a thousand to one half; these failures are as
-//! frequent as requested.
+//! Every pipeline under every failure of its sensors, at rates from one in a thousand to one half; the failures have
+//! the requested rate.
 
 use std::sync::Mutex;
 

@@ -16,7 +16,8 @@ fn true_mps2(speed_mps: f64) -> f64 {
     0.5 + 0.5 / (1.0 + speed_mps / 10.0)
 }
 
-/// Twelve stops from 30 m/s, each a few percent off, the handle as given; `slides` marks sliding wheels.
+/// Twelve stops from 30 m/s, each with a brake a few percent stronger or weaker, and this handle; `slides` marks
+/// sliding wheels.
 fn recording(handle: f64, slides: bool) -> String {
     let mut text = String::from("t,v,b,s\n");
     let (mut time_s, step_s) = (0.0, 0.02);
@@ -174,7 +175,8 @@ fn every_value_of_the_form_says_what_it_rests_on_and_guesses_say_so() {
         let found = all.iter().find(|it| it["key"] == key).unwrap();
         (found["is_guess"].as_bool().unwrap(), found["rests_on"].as_str().unwrap().to_owned())
     };
-    // The form is whole, its factors lie at the boundaries of the emergency steps, and what is not known says so.
+    // The form is whole, its factors lie at the boundaries of the emergency steps, and unknown values are marked as
+    // guesses.
     let written: Value = serde_json::from_str(&std::fs::read_to_string(&etcs).unwrap()).unwrap();
     for key in written.as_object().unwrap().keys() {
         assert!(!basis(key).1.is_empty(), "{key}");

@@ -1,5 +1,5 @@
-//! Mistakes of a careless first user: wrong paths, wrong kinds of files, recordings that lack something. Every
-//! command describes the mistake and ends.
+//! Mistakes of a careless first user: wrong paths, wrong kinds of files, recordings that lack data. Every command
+//! describes the mistake and ends.
 
 use std::ffi::OsStr;
 use std::fmt::Write as _;
@@ -19,7 +19,7 @@ const MANIFEST: &str = "[dataset]\nname = \"x\"\n[train]\nfile = \"train.toml\"\
 const TRAIN: &str = "[train]\nmass_t = 100\nlength_m = 80\nrotating_mass_factor = 0.05\n\
     [resistance]\na = 1\nb = 0.02\nc = 0.0004\n";
 
-/// A run that pulls, coasts and brakes, for ten minutes at 1 Hz.
+/// A run with traction, coasting and braking, ten minutes at 1 Hz.
 fn run() -> String {
     let (mut text, mut speed_mps) = (String::from("t,v,F,i\n"), 0.0_f64);
     for second in 0..600 {

@@ -1,4 +1,4 @@
-//! Imports between the files of a package run one way.
+//! Imports between the files of a package form no circles.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

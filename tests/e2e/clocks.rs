@@ -1,6 +1,6 @@
 //! Wall clocks that jump by hours and days, under a daemon, a flight recorder and their files.
 //!
-//! The jumps are those of the processes under test; the host's clock is left alone.
+//! Only the clocks of the processes under test jump; the host's clock is not changed.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -24,7 +24,7 @@ const RECORDING: &str = env!("CARGO_BIN_EXE_dynocar-recording-under-test");
 const TRAIN: TrainId = TrainId(1);
 const HOUR_S: i64 = 3_600;
 
-/// A controller that never rests; 400 samples a second, so that a reader falls behind only after a second.
+/// A controller that publishes without pause, 400 samples a second, so that a reader falls behind only after a second.
 struct Controller {
     published: Arc<AtomicU64>,
     stop: Arc<AtomicBool>,
@@ -139,7 +139,7 @@ fn a_ring_loses_nothing_and_an_event_ends_whatever_the_wall_clock_does() {
     let recorder = ring.start(&site);
     let controller = Controller::start(&site.host());
     ring.await_next_file();
-    // By its date this file is older than what is kept before a moment, and than the ring reaches back.
+    // By its date this file is older than the time kept before an event, and older than the span of the ring.
     ring.strange.set_clock_ahead(30 * HOUR_S);
     ring.await_next_file();
     let (all, first) = (names(&ring.files()), ring.keep(&site));

@@ -1,4 +1,4 @@
-//! Every term that can be declared, before every estimator: a declaration that is true moves none.
+//! Every term that can be declared, with every estimator: a true declaration changes no estimate.
 
 #[path = "declared/drive.rs"]
 mod drive;
@@ -18,7 +18,7 @@ use terms::{Declaration, GRADIENT, TRACK, TRAIN, World, declarations};
 
 /// Share of its own standard deviation by which an estimate may move.
 const SHARE_MAX: f64 = 0.25;
-/// The same for estimates by random particles, which take other ways after any last bit.
+/// The same for estimates by random particles, which diverge after a difference in the last bit.
 const PARTICLES_SHARE_MAX: f64 = 1.0;
 /// Speeds in m/s at which resistances are compared.
 const SPEEDS_MPS: [f64; 3] = [6.0, 12.0, 20.0];

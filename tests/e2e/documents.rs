@@ -1,5 +1,5 @@
-//! Every link of the documentation leads somewhere, every command that it shows is one that its program takes,
-//! and no paragraph is too long to be read.
+//! Every link of the documentation leads somewhere, its program accepts every command that it shows, and no paragraph
+//! is too long.
 
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
@@ -10,14 +10,14 @@ use dynocar_tests::documents::{Page, Shown, pages};
 use dynocar_tests::soak::arguments::Arguments;
 use dynocar_tests::sources::workspace;
 
-/// The most words of a paragraph.
+/// Greatest number of words in a paragraph.
 const WORDS_MAX: usize = 120;
 
 fn assert_none(wrong: &[String]) {
     assert!(wrong.is_empty(), "{} places:\n{}", wrong.len(), wrong.join("\n"));
 }
 
-/// A path without `..`, as far as it is written.
+/// Returns a path without `..` and `.`, by its text alone.
 fn plain(path: &Path) -> PathBuf {
     let mut plain = PathBuf::new();
     for part in path.components() {

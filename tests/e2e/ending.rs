@@ -1,5 +1,5 @@
-//! Every long-running program ends when it is asked to, when its terminal is closed, and after its
-//! readers have gone: cleanly, with what it writes whole.
+//! Every long-running program ends when it is asked to, when its terminal is closed, and after its readers have gone:
+//! cleanly, with whole output files.
 
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
@@ -63,7 +63,7 @@ impl TestSite {
         self.site.path().join(name)
     }
 
-    /// The words of a command, `{…}` for what only the place knows.
+    /// Returns the words of a command, with the values of this site in place of `{…}`.
     fn arguments(&self, words: &str) -> Vec<String> {
         let fill = |word: &str| {
             word.replace("{site}", &self.site.path().display().to_string())
@@ -73,7 +73,7 @@ impl TestSite {
     }
 }
 
-/// A program, how one sees from outside that it is at work, and what it must leave.
+/// A program, a check from outside that it is at work, and a check of the files that it must leave.
 struct Program {
     name: &'static str,
     words: &'static str,
@@ -170,7 +170,7 @@ fn ended(place: &TestSite, program: &Program, end: End) -> ExitStatus {
     }
 }
 
-/// Whatever ends it, it ends with 0 and leaves what it must.
+/// After any way of ending, the exit status is 0 and the required files remain.
 fn ends_cleanly(program: &Program) {
     for end in ENDS {
         let mut place = TestSite::new();

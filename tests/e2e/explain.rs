@@ -1,4 +1,4 @@
-//! The explainer on simulated datasets whose truth is known.
+//! `explain` on simulated datasets whose truth is known.
 
 use std::path::Path;
 
@@ -232,7 +232,7 @@ fn a_force_outside_the_library_gets_its_form_and_goes_into_the_updated_model() {
 #[test]
 fn nothing_at_a_bound_of_what_is_looked_for_is_found() {
     let folder = tempfile::tempdir().unwrap();
-    // No train is so: what asks for it is something else.
+    // No train has such a factor: a residual that demands it has another cause.
     let beyond = TrueEffect::RotatingMass { rotating_mass_factor: 0.6 };
     let settings = SimulatorSettings {
         runs: 4,

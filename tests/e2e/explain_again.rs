@@ -1,4 +1,4 @@
-//! The files of `dynocar explain --grown` are a dataset that can be explained as it lies there.
+//! The files of `dynocar explain --grown` are a dataset that can be explained without changes.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use super::commands::{dynocar, said};
 
 const SEED: u64 = 31;
 
-/// A level line that nobody wrote down: the recorder says 0 ‰ instead.
+/// Removes the file of a level line; the recordings state 0 ‰ instead.
 fn without_a_line(folder: &Path) {
     std::fs::remove_file(folder.join("track.toml")).unwrap();
     let path = folder.join("dataset.toml");

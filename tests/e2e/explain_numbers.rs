@@ -1,9 +1,9 @@
-//! Every number in the source of `explain` is on the page that says where it comes from.
+//! Every number in the source of `explain` is on the page that states its origin.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Numbers that decide, at most.
+/// Greatest number of numbers that decide an answer.
 const DECIDING_MAX: usize = 30;
 
 fn sources(folder: &Path, files: &mut Vec<PathBuf>) {

@@ -1,5 +1,5 @@
-//! A simulated dataset of each kind of effect, and the answer of `explain`: computed once for all tests, and each kind
-//! is found by its name.
+//! A simulated dataset of each kind of effect, and the answer of `explain`, computed once for all tests; and the test
+//! that each kind is found by its name.
 
 use std::sync::OnceLock;
 
@@ -9,7 +9,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::{EffectRequest, SimulatedDataset, SimulatorSettings, simulate};
 
-/// Seed of all of them.
+/// Seed of all datasets.
 pub const SEED: u64 = 23;
 
 /// A dataset and its explanation.
@@ -18,7 +18,7 @@ pub struct Explained {
     pub explanation: Explanation,
 }
 
-/// That of one effect of a kind, or of none.
+/// Returns the dataset with one effect of a kind, or with none, and its explanation.
 pub fn explained(kind: EffectKind) -> &'static Explained {
     static ALL: [OnceLock<Explained>; EffectKind::ALL.len()] =
         [const { OnceLock::new() }; EffectKind::ALL.len()];

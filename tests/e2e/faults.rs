@@ -1,4 +1,4 @@
-//! Faults of processes, memory and directories: nobody hangs, nobody is misled, words are said.
+//! Faults of processes, memory and directories: no process hangs or is misled, and each fault is reported.
 
 use std::process::Command;
 use std::time::{Duration, Instant};

@@ -1,5 +1,5 @@
-//! The FMU: its numbers are those of `dynocar identify`, its refusals are in words, and the command
-//! packs what a simulator needs.
+//! The FMU: its numbers are those of `dynocar identify`, its refusals are in words, and the command packs all files
+//! that a simulator needs.
 
 use std::fs::{read, read_to_string, write};
 use std::path::{Path, PathBuf};
@@ -191,7 +191,7 @@ fn calls_in_the_wrong_order_or_of_nonsense_are_refused_in_words() {
     };
     let component = fmu.component;
     refused(fmu.step(0.0), "fmi2DoStep is not allowed before initialization");
-    // SAFETY: the component lives; a NULL array is what is tried.
+    // SAFETY: the component lives; the NULL array is the tested input.
     unsafe {
         refused(fmi2Terminate(component), "fmi2Terminate is not allowed before initialization");
         refused(fmi2ExitInitializationMode(component), "not allowed before initialization");

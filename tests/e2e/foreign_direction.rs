@@ -9,7 +9,8 @@ use dynocar_tests::process::DaemonSite;
 
 use crate::foreign_files::{DYNOCAR, described};
 
-/// The demo's runs, their gradient climbing as the chainage grows, without their positions, below these names.
+/// Returns the demo's runs without their positions, below a header, with `sign` times the gradient along the growing
+/// chainage.
 fn without_position(header: &str, sign: f64) -> Vec<String> {
     let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo");
     let dataset = load(&demo).expect("the demo");

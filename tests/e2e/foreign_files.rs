@@ -1,4 +1,5 @@
-//! Recordings of other people's tools: the values of one train in other forms, read as they are in the plain one.
+//! Recordings of other people's tools: the values of one train in other forms give the same samples as in the plain
+//! form.
 
 use std::fmt::Write as _;
 
@@ -12,7 +13,7 @@ pub const NAMES: [&str; 6] =
     ["time_s", "position_m", "speed_mps", "traction_force_n", "brake_force_n", "gradient_permille"];
 pub const ROWS: u32 = 600;
 
-/// A train that speeds up, coasts and brakes, over hills; the row's values by [`NAMES`].
+/// Returns the values of a row in the order of [`NAMES`]: a train that accelerates, coasts and brakes, over hills.
 pub fn values(row: u32) -> [f64; 6] {
     let time = f64::from(row) * 0.2;
     let speed = if time < 60.0 { 0.2 * time } else { 12.0 - 0.15 * (time - 60.0) };
@@ -25,7 +26,7 @@ pub fn values(row: u32) -> [f64; 6] {
     [time, 1000.0 + position, speed, traction, brake, 4.0 * (position / 200.0).sin()]
 }
 
-/// A file of these columns, each cell as `cell` writes it.
+/// Returns a file of these columns; `cell` writes each cell.
 pub fn table(names: &[&str], delimiter: &str, cell: impl Fn(u32, usize) -> String) -> String {
     let mut text = names.join(delimiter) + "\n";
     for row in 0..ROWS {

@@ -1,4 +1,4 @@
-//! Files of several trains, and of several locomotives of one.
+//! Files of several trains, and of several locomotives of one train.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Forces by laws that no library holds, their forms and what these predict.
+//! Forces by laws that the library of effects lacks, their forms, and the predictions of these forms.
 
 use dynocar_analysis::explain::answer::{ExplainAnswer, Verdict};
 use dynocar_analysis::explain::explain;
@@ -19,7 +19,7 @@ fn simulated(seed: u64) -> (SimulatedDataset, Law) {
     (simulated, law)
 }
 
-/// Returns the answer on a force that must be called unknown, and the error over the true model's.
+/// Returns the answer on a force that must be called unknown, its forms, and its error over the true model's.
 fn explained(simulated: &SimulatedDataset) -> (ExplainAnswer, Vec<ExtraResistance>, f64) {
     let dataset = read_files(&dataset_files(simulated));
     let explanation = explain(&dataset, &|_, _| {}).expect("usable runs");

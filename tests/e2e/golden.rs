@@ -1,5 +1,4 @@
-//! The same samples give the same bits: twice, at any rate, beside any other pipelines, and as on
-//! the day the golden file was made.
+//! The same samples give the same bits: twice, at any rate, beside any other pipelines, and as in the golden file.
 
 use std::path::Path;
 use std::time::Duration;

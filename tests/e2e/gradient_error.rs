@@ -12,7 +12,7 @@ use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, TrainType, True
 fn a_wrong_gradient_is_found_with_its_profile_and_ambiguous_where_all_runs_go_one_way() {
     let simulated = simulate(&SimulatorSettings {
         train_type: Some(TrainType::Regional),
-        // Enough of them in either direction alone.
+        // Enough runs in either direction alone.
         runs: 16,
         holdout_runs: 4,
         ..SimulatorSettings::new(9001, EffectRequest::Kinds(vec![EffectKind::GradientError]))

@@ -1,6 +1,6 @@
-//! Hosts as they are: roots of any length and spelling, cleaners, containers, other users.
+//! Variety of real hosts: roots of any length and spelling, cleaners of temporary files, containers, other users.
 //!
-//! Whatever mounts does so in a mount namespace of its own.
+//! A test that mounts a file system does so in a mount namespace of its own.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};

@@ -14,7 +14,7 @@ use rustix::process::Signal;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 
-/// Equal to the bit, so that NaN and the sign of zero count.
+/// Returns the bits of the values, so that NaN and the sign of zero count in a comparison.
 fn bits(snapshot: &ParameterSnapshot) -> Vec<u64> {
     snapshot.values.iter().chain(&snapshot.covariance).map(|value| value.to_bits()).collect()
 }

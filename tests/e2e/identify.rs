@@ -71,13 +71,13 @@ fn write_dataset(folder: &Path, manifest: &str, train: &str) {
     }
 }
 
-/// The command over what lies in a folder.
+/// Runs the command over the dataset in a folder.
 fn asked(folder: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_dynocar-workshop-under-test"));
     command.current_dir(folder).args(["identify", "."]).args(arguments).output().unwrap()
 }
 
-/// The names of the estimators that ran, and of those that did not.
+/// Returns the names of the estimators that ran, and of those that did not.
 fn ran(folder: &Path, arguments: &[&str]) -> [Vec<String>; 2] {
     let output = asked(folder, &[arguments, &["--json", "-"]].concat());
     let answer: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();

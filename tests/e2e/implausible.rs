@@ -1,5 +1,5 @@
-//! A real daemon fed with samples that cannot be true: degraded, reported once in words, and seen by
-//! `dynocar health`.
+//! A real daemon fed with samples that cannot be true: the estimates are degraded, the fault is reported once, and
+//! `dynocar health` shows it.
 
 use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::{PipelineKind, Reason, SampleField, Status, TrainId, TrainSample};
@@ -9,8 +9,8 @@ use dynocar_transport::monotonic_now_ns;
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 const TRAIN: TrainId = TrainId(1);
 
-/// Pulls, coasts and brakes in turns on the level; 5 Hz in the samples' own time. The forces are
-/// in kN where N are meant.
+/// Returns a sample of a train that pulls, coasts and brakes in turn on level track, at 5 Hz in the samples' own time.
+/// The forces are in kN where N are expected.
 fn sample(speed_mps: &mut f64, index: u64) -> TrainSample {
     let force_n = match index % 600 {
         0..200 => 160e3,

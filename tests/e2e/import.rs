@@ -19,7 +19,7 @@ fn corpus(name: &str) -> String {
     format!("{CORPUS}/{name}")
 }
 
-/// Imports a file of the corpus into the folder `made`; gives what was printed.
+/// Imports a file of the corpus into the folder `made`; returns the printed text.
 fn import(site: &DaemonSite, name: &str, more: &[&str]) -> String {
     let file = corpus(name);
     done(site, &[&["import", &file, "-o", "made"], more].concat())

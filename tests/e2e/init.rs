@@ -1,4 +1,4 @@
-//! `dynocar init`: a first description of a train and of recordings that nobody described.
+//! `dynocar init`: a first description of a train and of recordings without one.
 
 use std::fs::{create_dir_all, read_to_string};
 use std::path::Path;

@@ -7,7 +7,7 @@ use dynocar_tests::process::DaemonSite;
 
 use crate::commands::{DYNOCAR, done, dynocar, run, said};
 
-/// Standard error of a command that must end with status 2 and write nothing into the folder `new`.
+/// Returns the standard error of a command that must end with status 2 and write nothing into the folder `new`.
 fn refusal(site: &DaemonSite, arguments: &[&str]) -> String {
     let mut process = site.start(DYNOCAR, arguments);
     let status = process.wait();
@@ -123,7 +123,7 @@ fn nobody_is_asked_and_a_closed_pipe_or_a_full_disk_changes_no_file() {
     let command = |folder: &str| {
         let mut command = Command::new(DYNOCAR);
         command.args(["init", folder, "--csv", "a.csv"]).current_dir(site.path());
-        // Held open and silent: whoever read from it would wait for ever.
+        // Standard input is held open and silent: a program that read from it would wait for ever.
         command.stdin(Stdio::piped()).stderr(Stdio::piped());
         command
     };

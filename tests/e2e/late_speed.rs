@@ -1,4 +1,4 @@
-//! A speed sensor that is late is reported as that, and no places are made up for what it does on gradients.
+//! A late speed sensor is reported as such, and its errors on gradients are not reported as places.
 
 use dynocar_analysis::explain::answer::{ExplainAnswer, ParameterValue, Verdict};
 use dynocar_analysis::explain::explain;
@@ -13,13 +13,13 @@ fn answer(files: &[FileText]) -> ExplainAnswer {
     explain(&read_files(files), &|_, _| {}).expect("usable runs").answer
 }
 
-/// Every kind that an answer names, the found ones first.
+/// Returns every kind that an answer names, the found ones first.
 fn named(answer: &ExplainAnswer) -> Vec<&str> {
     let found = answer.effects.iter().map(|effect| effect.kind);
     found.chain(answer.ambiguous_with.iter().copied()).collect()
 }
 
-/// A parameter of the late speed and its standard deviation.
+/// Returns a parameter of the late speed and its standard deviation.
 fn number_of(answer: &ExplainAnswer, name: &str) -> [f64; 2] {
     let effect = answer.effects.iter().find(|effect| effect.kind == "speed_delay").expect("found");
     [&effect.parameters, &effect.std].map(|all| match all[name] {
@@ -57,7 +57,7 @@ fn a_late_speed_is_named_whether_dead_time_or_lag_and_no_place_is_made_up() {
             let [found, std] = number_of(&answer, name);
             assert!((found - truth).abs() < 3.0 * std, "{seed}: {name} {found} ± {std}, {truth}");
         }
-        // Next to what the true model leaves of the noise.
+        // The remaining error is compared with that of the true model, which is noise.
         let left_mps = answer.rmse_after.unwrap();
         let true_mps = score(&dataset).full_run.true_mps;
         assert!(left_mps < 1.5 * true_mps.max(0.05), "{seed}: {left_mps}, {true_mps} at best");

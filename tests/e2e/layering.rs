@@ -6,13 +6,14 @@ use std::process::Command;
 
 use dynocar_tests::sources::{is_of_tests, rust_files, without_tests, workspace};
 
-/// Names of all packages that a package is built from.
+/// Returns the names of all packages that a package is built from.
 fn dependencies(package: &str) -> Vec<String> {
     let lines = tree(package, "normal");
     lines.iter().filter_map(|line| line.split(' ').next()).map(str::to_owned).collect()
 }
 
-/// Name and version of all packages below a package, by edges of some kinds; some of them more than once.
+/// Returns name and version of all packages on which a package depends by edges of some kinds; a package may occur more
+/// than once.
 fn tree(package: &str, edges: &str) -> Vec<String> {
     let output = Command::new(env!("CARGO"))
         .args(["tree", "--offline", "--edges", edges, "--prefix", "none", "--format", "{p}"])
@@ -34,9 +35,9 @@ fn assert_free_of(package: &str, forbidden: &[&str]) {
     }
 }
 
-/// The packages without channel, clock, file, thread and log: the declaration, what runs live, the methods
-/// of the papers, what reads recorded runs, and what explains them. The last says what may be computed side
-/// by side (rayon), and those who call it on which threads (decision 0018).
+/// The packages without channel, clock, file, thread and log: the declaration, the live pipelines, the methods of the
+/// papers, the reading of recorded runs, and their explanation. The last marks the parallel computations (rayon); its
+/// callers choose the threads (decision 0018).
 const PURE: [&str; 5] =
     ["dynocar-model", "dynocar-core", "dynocar-estimators", "dynocar-dataset", "dynocar-analysis"];
 /// Their sources.

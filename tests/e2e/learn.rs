@@ -21,7 +21,7 @@ use rustix::process::Signal;
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 const SEED: u64 = 23;
 const TRAIN: TrainId = TrainId(1);
-/// An explanation takes seconds, and a busy machine many times that.
+/// Longest time for an explanation, which takes seconds, and many times longer on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(540);
 
 /// A site with simulated runs, a configuration that declares their train and line, and a store.
@@ -74,7 +74,7 @@ impl Workplace {
         std::iter::once("learn".to_owned()).chain(named.into_iter().flatten()).collect()
     }
 
-    /// Learns once; gives what was said.
+    /// Learns once; returns the printed text.
     fn learn(&self, more: &[&str]) -> String {
         let output = self.learn_once(more);
         let said = String::from_utf8_lossy(&output.stdout).into_owned();

@@ -1,5 +1,5 @@
-//! Files as loggers write them: other letters, lines above the names, units below them, times that are no
-//! numbers and pass midnight.
+//! Files as loggers write them: other encodings, lines above the names, units below them, times that are not numbers
+//! and pass midnight.
 
 use std::fmt::Write as _;
 use std::fs::{read_to_string, write};
@@ -13,7 +13,7 @@ use super::commands::{done, dynocar, said};
 /// Seconds from midnight at which the run begins: it ends on the next day.
 const START_S: u32 = 86_400 - 200;
 
-/// A run that pulls, coasts and brakes, as a German logger writes it, with its own clock.
+/// Returns a run with traction, coasting and braking as a German logger writes it; `times` writes its clock.
 fn logged(times: impl Fn(u32) -> String) -> Vec<u8> {
     let mut text = String::from(
         "Fahrtenschreiber;XY 7;;\nTriebzug;Süd 4711;;\n\n\

@@ -1,6 +1,6 @@
-//! Allocations on a sample's way through the channels once the peers know each other: none on our side, and in the
-//! transport one reference count of fixed size for each message sent, taken and given back within the call
-//! (iceoryx2 0.10, `ChunkMutSharedState`).
+//! Allocations on a sample's way through the channels once the peers know each other: none in our code, and in the
+//! transport one reference count of fixed size for each sent message, allocated and freed within the call (iceoryx2
+//! 0.10, `ChunkMutSharedState`).
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;

@@ -1,5 +1,5 @@
-//! A controller's cycle makes no system call while the pipelines are awake: the kernel itself
-//! watches, and kills who makes one.
+//! A controller's cycle makes no system call while the pipelines are awake: the kernel itself watches, and kills a
+//! process that makes one.
 
 use dynocar_tests::process::{DaemonSite, Process};
 
@@ -9,11 +9,11 @@ const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 const PEER: &str = env!("CARGO_BIN_EXE_dynocar-sealed-peer");
 
 const BUSY: &str = "idle = \"busy\"";
-/// Falls asleep when no sample has come for a second.
+/// The thread falls asleep when no sample has come for a second.
 const ADAPTIVE: &str = "idle = \"adaptive\"\nspin_us = 1000000";
 const ECHO: &str = "[[pipelines]]\nkind = \"echo\"\n";
 
-/// A daemon that is awake, and a sealed controller doing something.
+/// Starts a daemon that stays awake, and a sealed controller that performs an action.
 fn sealed(site: &DaemonSite, idle: &str, what: &str) -> (Process, Process) {
     let config = site.write_config(1, idle, ECHO);
     let daemon = site.start(DYNOCAR, &["run", "--config", config.to_str().expect("UTF-8")]);

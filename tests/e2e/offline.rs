@@ -1,5 +1,6 @@
 //! Tests that wait for no controller's cycle: commands as a user runs them, findings of `explain`, the simulator of
-//! trains, the sources and documents as text, and hardship that is counted in samples, however slow the machine.
+//! trains, the sources and documents as text, and stress tests that count samples and do not depend on the speed of the
+//! machine.
 
 #[path = "init/commands.rs"]
 mod commands;
@@ -10,7 +11,7 @@ mod simulator;
 #[path = "../../client/tests/support/mod.rs"]
 mod support;
 
-// Commands, and what is shipped with them.
+// Commands, and the files that are shipped with them.
 mod brakes;
 mod careless;
 mod check;

@@ -1,4 +1,4 @@
-//! Texts of a real daemon for an operator: in its log, and from `dynocar health`.
+//! Messages of a real daemon to an operator: in its log, and from `dynocar health`.
 
 use std::time::Duration;
 
@@ -13,7 +13,7 @@ use rustix::process::Signal;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 const TRAIN: TrainId = TrainId(1);
-/// Of the simulated train with its brake.
+/// Seed of the simulated train with its brake.
 const SEED: u64 = 315;
 
 fn daemon(site: &DaemonSite, config: &str) -> Process {

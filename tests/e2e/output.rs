@@ -1,4 +1,4 @@
-//! Results that cannot be given: closed pipes, full disks, interrupted writers; and who gets what.
+//! Results that cannot be written: closed pipes, full disks, interrupted writers; and the right stream for each output.
 
 use std::fs::OpenOptions;
 use std::path::Path;

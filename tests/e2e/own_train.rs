@@ -1,4 +1,4 @@
-//! The guide of a new user's first half hour, command by command.
+//! The guide for a new user's first half hour, command by command.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -12,7 +12,7 @@ use rustix::process::Signal;
 use crate::commands::DYNOCAR;
 use crate::guide::{ROOT, blocks, guide, install, run};
 
-/// A run of the demo as a recorder with German habits would have written it.
+/// Returns a run of the demo in the form of a German recorder.
 fn recording(run: &Run, header: &str) -> String {
     let comma = |value: f64, decimals: usize| format!("{value:.decimals$}").replace('.', ",");
     let mut text = format!("{header}\n");

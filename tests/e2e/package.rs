@@ -1,5 +1,4 @@
-//! The Debian package, built as its page says and installed into an empty root; completions and
-//! manual, which it holds.
+//! The Debian package, built as its page says and installed into an empty root; its completions and manual pages.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -110,8 +109,8 @@ fn the_package_is_built_installed_and_runs() {
     links_and_runs(&root, folder.path());
 }
 
-/// Programs in C and C++ are built from nothing but what the package holds: with the archive, and
-/// with the shared library as pkg-config names it.
+/// Builds programs in C and C++ from the files of the package alone: with the archive, and with the shared library that
+/// pkg-config names.
 fn links_and_runs(root: &Path, folder: &Path) {
     let (source, out) = (folder.join("version.c"), folder.join("version"));
     let text = "#include <dynocar.h>\n#include <stdio.h>\n\

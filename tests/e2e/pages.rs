@@ -1,4 +1,4 @@
-//! Links, headings, paragraphs, and commands of the pages, word by word.
+//! Recognition of links, headings, paragraphs and commands on a page.
 
 use dynocar_tests::documents::Page;
 

@@ -1,4 +1,4 @@
-//! Files of ours after a power cut: whole, and never older than what was ordered to be kept.
+//! Dynocar's files after a power cut: whole, and never older than the last content that was kept on request.
 
 use std::path::{Path, PathBuf};
 
@@ -10,12 +10,12 @@ use dynocar_tests::power_cut::{LossyDisk, Neglect};
 const CONTENTS: [&str; 4] =
     ["the first estimate\n", "the second, longer estimate\n", "", "the last\n"];
 
-/// Cuts the power after every step of four states being kept; gives how many disks were looked
-/// at, and the first that was not as promised.
+/// Cuts the power after every step while four states are kept; returns the number of checked disks, and the first that
+/// broke the promise.
 fn cut(neglect: Neglect) -> (usize, Option<String>) {
     let path = Path::new("train-1.state");
     let disk = LossyDisk::new(neglect);
-    // Steps by which each content was ordered to be kept.
+    // Number of steps after which each content must be kept.
     let kept: Vec<usize> = CONTENTS
         .iter()
         .map(|content| {

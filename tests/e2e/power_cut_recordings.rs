@@ -1,5 +1,5 @@
-//! Recordings after a power cut: what was on the disk is read, kept stretches are whole or not there, and
-//! nobody who records waits for a disk.
+//! Recordings after a power cut: the files on the disk can be read, kept events are whole or absent, and no recorder
+//! waits for a disk.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::hash::{BuildHasher, RandomState};
@@ -19,13 +19,13 @@ use dynocar_shared::{TrainId, TrainSample};
 use dynocar_tests::power_cut::{Left, LossyDisk, Neglect, NotedDisk};
 
 const HOUR: Duration = Duration::from_secs(3600);
-/// Samples that are recorded, and after how many of them they are handed to the system.
+/// Number of recorded samples, and the number after which they are handed to the system.
 const SAMPLES: u64 = 120;
 const FLUSH: u64 = 20;
 /// The sample after which a suspicion rises.
 const SUSPICION: u64 = 75;
 
-/// A folder in memory: what a disk does is played, and no real one is waited for.
+/// A folder in memory: the disk is simulated, so that the test waits for no real one.
 fn place() -> tempfile::TempDir {
     tempfile::tempdir_in("/dev/shm").unwrap()
 }
@@ -139,7 +139,7 @@ impl Run {
     }
 }
 
-/// Looks at what a cut left, as whoever switches on the machine does.
+/// Checks the files after a power cut, as a user finds them at the next start.
 fn check(left: &Left, promise: &Promise, known: &mut Known) -> Result<(), String> {
     let mut folders: BTreeMap<&str, Vec<&Vec<u8>>> = BTreeMap::new();
     for (name, content) in left.iter().filter(|it| it.0.extension().is_some_and(|it| it == "mcap"))
@@ -173,7 +173,7 @@ struct Promise {
     oldest_kept: u64,
 }
 
-/// Samples by what the files hold.
+/// Samples by the contents of the files.
 type Known = HashMap<Vec<Vec<u8>>, Vec<u64>>;
 
 /// The samples of files that are recovered together.
@@ -212,7 +212,7 @@ fn is_whole(sequences: &[u64], oldest: u64, lasting: u64) -> Result<(), String> 
     Ok(())
 }
 
-/// The next flight recorder takes whatever is there.
+/// The next flight recorder starts from any files that are left.
 fn go_on(left: &Left) -> Result<(), String> {
     let place = place();
     let ring = place.path();

@@ -1,5 +1,5 @@
-//! The promises of the documents are held: every test they name exists, every `unsafe` is counted and justified,
-//! every licence allowed, every dependency of a controller reviewed.
+//! The promises of the documents are kept: every named test exists, every `unsafe` is counted and justified, every
+//! licence is allowed, every dependency of a controller is reviewed.
 
 use std::collections::BTreeMap;
 use std::process::Command;
@@ -11,7 +11,7 @@ fn read(path: &str) -> String {
         .unwrap_or_else(|error| panic!("{path}: {error}"))
 }
 
-/// Pairs (file, test) in a document: `` `path/file.rs::name` ``, or a file of Python.
+/// Returns the pairs (file, test) in a document: `` `path/file.rs::name` ``, or a file of Python.
 fn named_tests(document: &str) -> Vec<(String, String)> {
     document
         .split('`')

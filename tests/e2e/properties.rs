@@ -1,4 +1,4 @@
-//! Properties of any sample and any snapshot, whatever its bits.
+//! Properties of samples and snapshots with arbitrary bits.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use proptest::prelude::*;
 
 const TRAIN: TrainId = TrainId(1);
 
-/// Any bits, with the numbers that break readers more often than chance has them.
+/// Any bits, with a higher share of the numbers that break readers.
 fn any_float() -> impl Strategy<Value = f64> {
     prop_oneof![
         3 => any::<u64>().prop_map(f64::from_bits),
@@ -27,7 +27,7 @@ fn any_float() -> impl Strategy<Value = f64> {
     ]
 }
 
-/// A sample that is mostly plausible, so that sequences of them get somewhere.
+/// A mostly plausible sample, so that a sequence of them reaches more than the first check.
 fn any_sample() -> impl Strategy<Value = TrainSample> {
     let fields = prop::collection::vec((0..SampleField::ALL.len(), any_float()), 0..3);
     (any::<u16>(), -1_i8..=2, 0_u32..3, -50_000_000_i64..400_000_000, fields, 0_u64..4).prop_map(

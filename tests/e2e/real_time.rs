@@ -18,7 +18,7 @@ const PIPELINES: &str = "[[threads]]\nname = \"measured\"\nidle = \"busy\"\nprio
                          [[pipelines]]\nkind = \"mils\"\nthread = \"measured\"\n\
                          [[pipelines]]\nkind = \"residual_monitor\"\nthread = \"measured\"\n";
 
-/// Page faults and waits of its own accord of the daemon's measured thread.
+/// Returns the page faults and voluntary waits of the daemon's measured thread.
 fn faults_and_waits(daemon: &Process) -> (u64, u64) {
     let tasks = std::fs::read_dir(format!("/proc/{}/task", daemon.id())).expect("a process");
     let task = tasks

@@ -1,4 +1,4 @@
-//! `dynocar replay` reports the fate of its own samples, and fails where nobody used them.
+//! `dynocar replay` reports the fate of its own samples, and fails where no pipeline used them.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ const PIPELINES: &str = "[[threads]]\nname = \"all\"\n\
                          [[pipelines]]\nkind = \"echo\"\nthread = \"all\"\n\
                          [[pipelines]]\nkind = \"rls\"\nthread = \"all\"\n";
 
-/// Exit status and standard error of a replay of the demo's first run.
+/// Returns exit status and standard error of a replay of the demo's first run.
 fn replay(site: &DaemonSite, more: &[&str]) -> (Option<i32>, String) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo");
     let mut arguments =
@@ -20,7 +20,7 @@ fn replay(site: &DaemonSite, more: &[&str]) -> (Option<i32>, String) {
     (status.code(), process.errors())
 }
 
-/// The number before the first of these words.
+/// Returns the number before the first occurrence of some words.
 fn number_before(words: &str, said: &str) -> u64 {
     let number = said.split(words).next().and_then(|it| it.split_whitespace().last());
     number.and_then(|it| it.parse().ok()).unwrap_or_else(|| panic!("no number of{words}: {said}"))

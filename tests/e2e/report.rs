@@ -11,7 +11,7 @@ use dynocar_tests::simulator::dataset_writer::write_dataset;
 use dynocar_tests::simulator::{EffectRequest, SimulatedDataset, SimulatorSettings, simulate};
 use serde_json::{Value, json};
 
-/// A train whose runs are explained in a second.
+/// Seed of a train whose runs are explained in a second.
 const SEED: u64 = 23;
 const DESKTOP_PX: u32 = 1280;
 const PHONE_PX: u32 = 390;
@@ -19,7 +19,7 @@ const PHONE_PX: u32 = 390;
 /// A name that would do harm if it were taken for HTML.
 const NAME: &str = "<img src=x onerror=console.error(1)> & 'line'";
 
-/// Counts what a page must have and lists what sticks out of it or is too small to read.
+/// Counts the required parts of a page, and lists elements that stick out of it or are too small to read.
 const LOOK: &str = r#"(() => {
     const width = document.documentElement.clientWidth;
     const isShown = element => element.getClientRects().length > 0;

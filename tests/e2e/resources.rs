@@ -18,7 +18,7 @@ const SOAK: &str = env!("CARGO_BIN_EXE_dynocar-soak");
 const ECHO: &str = "[[pipelines]]\nkind = \"echo\"\n";
 const TRAIN: TrainId = TrainId(1);
 
-/// A pipe that a neighbour has filled.
+/// Returns a pipe that another process has filled.
 fn full_pipe() -> (PipeReader, PipeWriter) {
     let (reader, mut writer) = std::io::pipe().unwrap();
     let flags = rustix::fs::fcntl_getfl(&writer).unwrap();
@@ -204,7 +204,7 @@ fn metrics_are_answered_beside_slow_peers_with_head_slash_and_query() {
         answer
     };
     await_true(|| ask("GET /metrics").contains("dynocar_"), || "the first snapshot".into());
-    // Whoever is slow is not waited for: its own answer comes after those of the quick.
+    // The daemon does not wait for a slow client: its answer comes after those of quick ones.
     let mut slow = connect();
     slow.write_all(b"GET /metrics HTTP/1.1\r\n").unwrap();
     let quick = ask("GET /metrics/?x=1");
@@ -225,7 +225,7 @@ fn metrics_are_answered_beside_slow_peers_with_head_slash_and_query() {
     drop(dawdlers);
 }
 
-/// Processes that a process started, whoever looks after them now.
+/// Returns the processes that a process started.
 fn children_of(process: u32) -> Vec<String> {
     let tasks = format!("/proc/{process}/task/{process}/children");
     let children = std::fs::read_to_string(tasks).unwrap_or_default();

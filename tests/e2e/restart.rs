@@ -1,4 +1,4 @@
-//! `kill -9` of daemon, controller or client, and what the others see: real processes.
+//! `kill -9` of daemon, controller or client, and the view of the others, with real processes.
 
 use std::time::Instant;
 

@@ -1,4 +1,4 @@
-//! The daemon beside controllers, in processes of their own.
+//! The daemon and controllers in separate processes.
 
 mod accounting;
 mod adoption;

@@ -1,5 +1,5 @@
-//! The shipped parts work together: the daemon with `config/daemon.toml`, the demo's recording, and the examples in
-//! C, C++ and Rust as they are (that in Python: `client/python/tests`).
+//! The shipped parts work together: the daemon with `config/daemon.toml`, the demo's recording, and the examples in C,
+//! C++ and Rust (`client/python/tests` tests that in Python).
 
 use std::path::Path;
 use std::process::Command;
@@ -18,7 +18,7 @@ fn shipped(path: &str) -> String {
     path.to_str().expect("a UTF-8 path").to_owned()
 }
 
-/// The daemon as shipped, once it has seen the demo's recording.
+/// Returns the daemon with the shipped configuration, after it has seen the demo's recording.
 fn daemon_that_has_learned(site: &DaemonSite) -> Process {
     let daemon = site.start(DYNOCAR, &["run", "--config", &shipped("config/daemon.toml")]);
     daemon.await_error("serving");

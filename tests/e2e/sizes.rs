@@ -1,21 +1,22 @@
-//! Functions and files that can be read at a sitting, and files that are worth opening.
+//! Functions and files that are short enough to read, and files that are long enough to be worth opening.
 
 use dynocar_tests::sources::{
     FOLDERS, is_of_tests, item_lines, rust_files, without_tests, workspace,
 };
 
-/// A function's lines, its head and its comments within it counted.
+/// Greatest number of lines of a function, with its head and the comments within it.
 const FUNCTION_LINES_MAX: usize = 70;
-/// A file's lines, its tests counted.
+/// Greatest number of lines of a file, with its tests.
 const FILE_LINES_MAX: usize = 400;
-/// Lines of a file that stands for itself.
+/// Least number of lines of a file.
 const FILE_LINES_MIN: usize = 40;
 /// Folders whose files may be shorter: each holds one physical law.
 const LAWS: &str = "daemon/model/src/terms";
-/// The heads of crates, modules and programs of tests, which may be shorter, as the programs under test are.
+/// Names of the files at the heads of crates, modules and programs of tests, which may be shorter; so may the programs
+/// under test.
 const HEADS: [&str; 6] = ["mod", "lib", "main", "serving", "offline", "hot_path"];
 
-/// The name of the function that a line begins.
+/// Returns the name of the function that a line begins.
 fn function_name(line: &str) -> Option<&str> {
     const BEFORE: [&str; 6] = ["pub", "const", "async", "unsafe", "extern", "\"C\""];
     let is_before = |word: &&str| BEFORE.contains(word) || word.starts_with("pub(");
@@ -24,7 +25,7 @@ fn function_name(line: &str) -> Option<&str> {
     words.next()?.split(['(', '<']).next()
 }
 
-/// The functions of a source that are longer than allowed, with their lengths.
+/// Returns the functions of a source that are longer than allowed, with their lengths.
 fn long_functions(text: &str) -> Vec<(&str, usize)> {
     let lines = without_tests(text);
     let lengths = lines.iter().enumerate().filter_map(|(at, line)| {

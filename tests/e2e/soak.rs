@@ -97,6 +97,6 @@ fn a_model_that_is_no_better_is_adopted_no_oftener_than_configured() {
     let (trains, years, between) = (3, 27, 20_000.0);
     let found = mistakes::measure(trains, years, 400, between);
     assert!(found.rivals >= 6, "{found:?}");
-    // Ten thousand trips a year: one in two years of each train is what the configuration allows.
+    // Ten thousand trips a year: the configuration allows one adoption in two years of each train.
     assert!((found.adopted as f64) <= found.train_years / 2.0, "{found:?}");
 }

@@ -1,4 +1,4 @@
-//! Estimates that outlive the daemon: taken up, refused with a reason, never torn.
+//! Estimates that outlive the daemon: they are taken up or refused with a reason, and never torn.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -380,7 +380,7 @@ fn a_killed_daemon_s_successor_answers_a_driving_controller_with_its_first_sampl
     };
     let before = *drive(&mut reader, &samples[..killed]).last().unwrap();
     assert!(IN_USE.iter().all(|&it| before.is_usable_for(it)), "{:?}", before.reason());
-    // The keeper leaves what is newest each second.
+    // The keeper writes the newest state each second.
     let left = cast.site.host().root().join("train-1.state");
     let is_newest = || {
         let text = file::read(&left).ok().flatten()?;

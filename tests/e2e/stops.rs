@@ -11,8 +11,9 @@ const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 const TRAIN: &str = "[train]\nmass_t = 100\nlength_m = 80\nrotating_mass_factor = 0.05\n\
     [resistance]\na = 1\nb = 0.02\nc = 0.0004\n[brake]\nmax_force_kn = 1\n";
 
-/// Cruises for 30 s, then stops with a friction that grows as the speed falls, scaled by a factor.
-/// Time, speed and command at 5 Hz, speed in steps of 0.1 km/h; and the distance of the stop in m.
+/// Returns a recording and the distance of its stop in m. The train cruises for 30 s, then stops with a friction that
+/// grows as the speed falls, scaled by a factor. The recording has time, speed and command at 5 Hz, the speed in steps
+/// of 0.1 km/h.
 fn recording(factor: f64, from_mps: f64) -> (String, f64) {
     let (mut text, mut speed_mps, mut distance_m) = (String::from("t,v,b\n"), from_mps, 0.0);
     let step_s = 0.01;

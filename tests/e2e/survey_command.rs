@@ -1,4 +1,4 @@
-//! `dynocar survey` as a person uses it: a line, new recordings on it, and what cannot be surveyed.
+//! `dynocar survey` as a person uses it: a line, new recordings on it, and recordings that cannot be surveyed.
 
 use std::fs::{create_dir_all, read_to_string, write};
 use std::path::{Path, PathBuf};
@@ -26,7 +26,7 @@ impl Surveyed {
     }
 }
 
-/// Four short runs to and fro, three of them to fit; all tests look at the same.
+/// Returns four short runs in both directions, three of them to fit; all tests share them.
 fn surveyed() -> &'static Surveyed {
     static SURVEYED: OnceLock<Surveyed> = OnceLock::new();
     SURVEYED.get_or_init(|| {

@@ -17,7 +17,7 @@ const MANIFEST: &str = "[dataset]\nname = \"steady\"\n[train]\nfile = \"train.to
 const TRAIN: &str = "[train]\nmass_t = 100\nlength_m = 80\nrotating_mass_factor = 0.06\n\
     [resistance]\na = 1.5\nb = 0.02\nc = 0.0008\n";
 
-/// Runs on the level at the given speeds in m/s, five minutes each, with noise on speed and force.
+/// Explains runs on level track at the given speeds in m/s, five minutes at each, with noise on speed and force.
 fn explained(folder: &Path, speeds_mps: &[f64]) -> Explanation {
     let mut manifest = String::from(MANIFEST);
     for run in 0..3_u64 {

@@ -1,4 +1,4 @@
-//! Keys of `train.toml`, `track.toml` and `dataset.toml` stand in their table alone.
+//! The keys of `train.toml`, `track.toml` and `dataset.toml` are written only in the table of keys.
 
 use dynocar_analysis::dataset::keys;
 use dynocar_tests::sources::{FOLDERS, is_of_tests, rust_files, without_tests, workspace};
@@ -11,7 +11,7 @@ const TABLE: [&str; 4] = [
     "daemon/model/src/train/numbers.rs",
 ];
 
-/// Where the same word is no key of these files, with the file and what it is there.
+/// Files in which the same word is not a key of these files, with its meaning there.
 const OTHERS: [(&str, &str); 11] = [
     ("daemon/analysis/src/explain/", "a parameter of the answer, or advice in it"),
     ("daemon/core/src/plausibility/input_fault.rs", "a fault"),
@@ -26,7 +26,7 @@ const OTHERS: [(&str, &str); 11] = [
     ("shared/src/vocabulary/effects.rs", "an effect"),
 ];
 
-/// The texts in quotes of a line of source.
+/// Returns the texts in quotes in a line of source.
 fn texts(line: &str) -> Vec<String> {
     let (mut texts, mut open, mut letters) = (Vec::new(), None::<String>, line.chars());
     while let Some(letter) = letters.next() {

@@ -1,10 +1,10 @@
-//! The page of troubles has a line for each message that does not say what to do, and none that is not there.
+//! The page of troubles has a line for each message that names no remedy, and no line for other messages.
 
 use std::collections::BTreeMap;
 
 use dynocar_tests::sources::workspace;
 
-/// Where messages are raised.
+/// Folders of the sources that raise messages.
 const FOLDERS: [&str; 18] = [
     "daemon/src",
     "daemon/workshop/src",
@@ -51,9 +51,9 @@ const SENTENCES: [&str; 3] = [
     "daemon/dataset/src/declared.rs",
     "shared/src/stopping.rs",
 ];
-/// Messages that say what to do themselves, as the page would show them.
+/// Messages that name the remedy themselves, as the page would show them.
 const PLAIN: &str = include_str!("plain_messages.txt");
-/// Stands for what changes from message to message.
+/// Stands for the variable parts of a message.
 const GAP: char = '\0';
 
 /// A file of source: its code, each literal of text as a lone `"`, and those literals in order.
@@ -207,8 +207,8 @@ fn flat(code: &str) -> String {
     code.split_whitespace().collect()
 }
 
-/// A message's fixed words: spaces folded, each run of placeholders as one gap, without the name of
-/// a file in front and what may follow at the end.
+/// A message's fixed words: spaces folded, each run of placeholders as one gap, without the name of a file in front and
+/// the variable end.
 fn fixed_words(message: &str) -> String {
     let mut words = message.split_whitespace().collect::<Vec<_>>().join(" ");
     while words.contains("\0\0") {
@@ -236,7 +236,7 @@ fn of_literal(literal: &str, constants: &BTreeMap<&str, &str>) -> String {
     fixed_words(&(message + rest))
 }
 
-/// The messages in the first column of the page's tables, `‹…›` being what changes.
+/// The messages in the first column of the page's tables, with their variable parts as `‹…›`.
 fn on_page(page: &str) -> Vec<String> {
     let mut found = Vec::new();
     for row in page.lines().filter_map(|line| line.strip_prefix("| ")) {

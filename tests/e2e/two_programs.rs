@@ -14,7 +14,7 @@ const TRAIN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/demo/train.t
 fn installed(site: &DaemonSite, program: &str, place: &str) -> PathBuf {
     let path = site.path().join(place);
     std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-    // Not from this process: a test beside this one that forks would hold the file open for writing.
+    // Another process copies it: a concurrent test that forks would otherwise hold the file open for writing.
     assert!(Command::new("cp").arg(program).arg(&path).status().unwrap().success());
     path
 }
@@ -27,7 +27,7 @@ fn words(bytes: &[u8]) -> String {
     String::from_utf8(bytes.to_vec()).unwrap()
 }
 
-/// The commands of a program with what its help says of each, whatever heading they stand under.
+/// Returns the commands of a program with the help text of each, under all headings.
 fn commands(program: &str) -> Vec<(String, String)> {
     let help = words(&Command::new(program).arg("--help").output().unwrap().stdout);
     let is_name = |name: &str| name.starts_with(|letter: char| letter.is_ascii_lowercase());

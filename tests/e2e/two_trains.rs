@@ -1,4 +1,4 @@
-//! A recording of two trains: every command over recorded runs takes the one that `--train` names.
+//! A recording of two trains: every command over recorded runs uses the train that `--train` names.
 
 use std::path::Path;
 

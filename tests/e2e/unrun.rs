@@ -1,10 +1,10 @@
-//! No test stands where none is run: in a target whose tests are not built, or on pages whose code is not.
+//! No test stands where it is never run: in a target whose tests are not built, or on pages whose code is not run.
 
 use std::path::{Path, PathBuf};
 
 use dynocar_tests::sources::{rust_files, workspace};
 
-/// The sources of a program: its file, and what lies beside a `main.rs` that has a folder for itself.
+/// Returns the sources of a program: its file, and the files beside a `main.rs` that has its own folder.
 fn program_sources(package: &str, file: &str) -> Vec<PathBuf> {
     match file.strip_suffix("/main.rs") {
         Some(folder) if folder != "src" => rust_files(&format!("{package}/{folder}")),
@@ -12,7 +12,7 @@ fn program_sources(package: &str, file: &str) -> Vec<PathBuf> {
     }
 }
 
-/// Returns the first line with a test, or with code on a page where no code may stand; a block of text is no code.
+/// Returns the first line with a test, or with code on a page where no code may stand; a block of text is not code.
 fn unrun(text: &str, (has_tests, has_code): (bool, bool)) -> Option<&str> {
     let mut is_open = false;
     text.lines().find(|line| {
@@ -26,7 +26,7 @@ fn unrun(text: &str, (has_tests, has_code): (bool, bool)) -> Option<&str> {
     })
 }
 
-/// Whether a target's tests and its pages' code are run.
+/// Returns whether a target's tests and the code on its pages are run.
 fn runs(target: &toml::Value) -> (bool, bool) {
     let is_run = |key| target.get(key).and_then(toml::Value::as_bool).unwrap_or(true);
     (is_run("test"), is_run("doctest"))

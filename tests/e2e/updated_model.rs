@@ -1,4 +1,4 @@
-//! The fit of `explain`, written as files, is applied by the daemon to the bit.
+//! The daemon applies the fit of `explain`, written as files, with the same bits.
 
 use dynocar_analysis::dataset::{Dataset, parse_track, parse_train};
 use dynocar_analysis::explain::effects::{Candidate, LIBRARY, On, Past, UNKNOWN};

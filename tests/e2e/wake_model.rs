@@ -1,16 +1,15 @@
 //! The protocol by which a pipeline thread falls asleep and a controller wakes it (decision 0003),
 //! over every interleaving and every weak-memory outcome that loom knows.
 //!
-//! The channels between the two are the transport's; what is ours is the order: each side writes
-//! its word, then a full fence, then reads the other's.
+//! The channels between the two are the transport's; Dynocar adds the order: each side writes its word, then issues a
+//! full fence, then reads the other's word.
 
 use loom::sync::Arc;
 use loom::sync::atomic::Ordering::{Relaxed, SeqCst};
 use loom::sync::atomic::{AtomicU64, fence};
 use loom::thread;
 
-/// One attempt to fall asleep beside one publication; true when the thread sleeps and nobody
-/// wakes it.
+/// One attempt to fall asleep beside one publication; returns whether the thread sleeps and is not woken.
 fn is_left_asleep(with_fences: bool) -> bool {
     let sample = Arc::new(AtomicU64::new(0));
     let sleeping = Arc::new(AtomicU64::new(0));
@@ -21,7 +20,7 @@ fn is_left_asleep(with_fences: bool) -> bool {
             if with_fences {
                 fence(SeqCst);
             }
-            // Notifies who sleeps.
+            // Notifies a sleeping thread.
             sleeping.load(Relaxed) == 1
         })
     };

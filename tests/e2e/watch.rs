@@ -1,4 +1,4 @@
-//! `dynocar watch` with a real daemon and, by tmux, in a real terminal.
+//! `dynocar watch` with a real daemon, in a real terminal by tmux.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -1,8 +1,8 @@
 //! The promises of `advice` are kept by the daemon's pipelines.
 //!
-//! A train is driven about at random, and then over each manoeuvre of the catalogue; the forecast made
-//! from the snapshot before a manoeuvre is held against the snapshot after it. Motion and forces are the
-//! simulator's; the samples have the noise of sensors, and the true force is disturbed.
+//! A train is driven at random, and then through each manoeuvre of the catalogue; the forecast from the snapshot before
+//! a manoeuvre is compared with the snapshot after it. Motion and forces are the simulator's; the samples have the
+//! noise of sensors, and the true force is disturbed.
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ const DISTURBANCE: f64 = 0.25;
 const MASS_KG: f64 = 220e3;
 const TRUTH: Davis = Davis { a: 1.7, b: 0.02, c: 0.0042 };
 const SEEDS: u64 = 30;
-/// Time in s of driving about before anything is asked.
+/// Time in s of random driving before the first forecast.
 const BEFORE_S: f64 = 120.0;
 /// A manoeuvre counts that is foretold to leave at most this share of an interval.
 const SHARE_MAX: f64 = 0.95;

@@ -1,4 +1,4 @@
-//! The steps of a brake against the truth of simulated trains whose stops differ.
+//! The estimated steps of a brake, compared with the true deceleration of simulated trains whose stops differ.
 
 use dynocar_analysis::brakes::{SpeedSteps, lower_bound};
 use dynocar_analysis::parallel::of_each_number;

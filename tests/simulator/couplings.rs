@@ -1,4 +1,4 @@
-//! Cars on couplings, with slack in a freight train, the tacho on the first.
+//! Cars on couplings, with slack in a freight train, and with the tacho on the first car.
 
 use dynocar_analysis::explain::explain;
 use dynocar_model::track::StepProfile;
@@ -74,7 +74,7 @@ fn a_pulled_pair_settles_where_the_coupling_carries_the_wagon() {
     move_leading_car(&TruePhysics { train: &train, line: &line, plan, disturbances }, &mut states);
     let beside_mps = |state: &TrueState| state.wheel_speed_mps - SPEED_MPS;
     let ahead_m = states.iter().map(beside_mps).sum::<f64>() * TRUE_STEP_S;
-    // Half of what the coupling is stretched by: the centre of mass has not moved.
+    // Half of the coupling's extension, since the centre of mass has not moved.
     let expected_m = 0.25 * PULL_N / STIFFNESS_N_PER_M;
     assert!((ahead_m - expected_m).abs() < 2e-3 * expected_m, "{ahead_m} m");
     assert!(states.last().is_some_and(|state| beside_mps(state).abs() < 1e-6));

@@ -1,5 +1,5 @@
-//! Simulated trains of which the drive's power is recorded and no force: the efficiency that is
-//! estimated, its interval, and what is explained with it.
+//! Simulated trains whose recordings hold the drive's power and no force: the estimated efficiency, its interval, and
+//! the explanation with it.
 
 use dynocar_analysis::dataset::{Dataset, ForceSource};
 use dynocar_analysis::explain::{drive_efficiency, explain};
@@ -10,14 +10,15 @@ use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, TrainType, simu
 
 /// Seeds of the measurement; none of them took part in a choice.
 const SEEDS: std::ops::Range<u64> = 61_000..61_015;
-/// 95 % intervals hold the truth in 11 or more of 15 cases but for one time in a thousand.
+/// Least number of intervals that hold the truth: right 95 % intervals do so in 11 or more of 15 cases, but for one
+/// time in a thousand.
 const HELD_MIN: usize = 11;
-/// Largest error of an efficiency: what masses, gradients and a, b, c of the declaration leave.
+/// Largest error of an efficiency: the remaining uncertainty of the declared masses, gradients and a, b, c.
 const ERROR_MAX: f64 = 0.02;
 
-/// Half a 95 % interval is no wider than this.
+/// Largest half width of a 95 % interval.
 const HALF_WIDTH_MAX: f64 = 0.025;
-/// Seeds that are explained, one for each kind, and how many of them must be named rightly.
+/// Explained seeds, one for each kind, and the number of them that must be named rightly.
 const EXPLAINED: std::ops::Range<u64> = 61_100..61_103;
 const RIGHT_MIN: usize = 3;
 /// Largest error in m/s over 60 s on runs held out.

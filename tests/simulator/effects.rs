@@ -1,4 +1,4 @@
-//! Each effect changes what it should and nothing else, and matters.
+//! Each effect changes its own quantities and no others, and its size matters.
 
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::disturbances::Disturbances;
@@ -20,7 +20,7 @@ fn ideal(kinds: &[EffectKind], seed: u64) -> SimulatedDataset {
     })
 }
 
-/// The same train and line without effects.
+/// Returns the same train and line without effects.
 fn null_of(dataset: &SimulatedDataset) -> SimulatedDataset {
     simulate(&SimulatorSettings {
         train_type: Some(dataset.train.train_type),
@@ -29,7 +29,7 @@ fn null_of(dataset: &SimulatedDataset) -> SimulatedDataset {
     })
 }
 
-/// Puts back what an effect of this kind may change.
+/// Resets the quantities that an effect of this kind may change.
 fn undo(kind: EffectKind, disturbances: &mut Disturbances, neutral: &Disturbances) {
     let neutral = neutral.clone();
     let d = disturbances;

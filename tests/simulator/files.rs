@@ -1,4 +1,4 @@
-//! The simulator's files: reproducible, complete, silent about the truth.
+//! The simulator's files are reproducible and complete, and do not reveal the truth.
 
 use dynocar_core::pipeline::admission::Admission;
 use dynocar_shared::vocabulary::EffectKind;

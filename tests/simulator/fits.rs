@@ -1,4 +1,5 @@
-//! Fits that go on from another, and effects that act block by block, against the same from the start and at once.
+//! Fits that continue from another fit, compared with fits from the start; and effects evaluated block by block,
+//! compared with the evaluation at once.
 
 use dynocar_analysis::explain::effects::{Candidate, LIBRARY};
 use dynocar_analysis::explain::evidence::SampleForces;
@@ -10,7 +11,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, TrueDeviations, simulate};
 
-/// Shows the proposals of the library for a train with late forces beside a, b and c alone.
+/// Calls `look` with the library's proposals for a train with late forces, when only a, b and c are fitted.
 fn proposed(look: impl Fn(&Explanation, &Scan, Vec<Candidate>)) {
     let simulated = simulate(&SimulatorSettings {
         deviations: TrueDeviations::ROUGH,

@@ -1,5 +1,5 @@
 //! Railways recorded once a second, with forces of an instant, held from stamp to stamp, or averaged: the time offset
-//! that a survey finds, and the explanation that follows.
+//! that a survey finds, and the subsequent explanation.
 
 use dynocar::dataset;
 use dynocar_analysis::dataset::Dataset;
@@ -10,7 +10,7 @@ use dynocar_tests::simulator::{
 };
 use dynocar_workshop::survey::survey_folder;
 
-/// Seeds of which none took part in a choice.
+/// Seeds that were not used to choose any setting.
 const SEEDS: std::ops::Range<u64> = 65_000..65_002;
 
 /// Largest error in m/s over 60 s on a known line, however forces are recorded.
@@ -26,7 +26,7 @@ fn settings(seed: u64, force_sampling: ForceSampling) -> SimulatorSettings {
     }
 }
 
-/// Effects found and the error in m/s over 60 s on runs held out.
+/// Returns the effects found and the error in m/s over 60 s on runs held out.
 fn explained(dataset: &Dataset) -> (Vec<&'static str>, f64) {
     let explained = explain(dataset, &|_, _| ()).unwrap();
     let kinds = explained.answer.effects.iter().map(|effect| effect.kind).collect();

@@ -1,4 +1,5 @@
-//! Of many runs the search holds some, thinned, and each is read once: work and memory grow no faster than the data.
+//! Datasets of many runs: the search holds some of them, with thinned samples, and reads each run once, so that work
+//! and memory grow no faster than the data.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -12,7 +13,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, simulate};
 
-/// Many runs with a kind of effect.
+/// Returns settings for many runs with these kinds of effects.
 fn months_of(seed: u64, kinds: Vec<EffectKind>) -> SimulatorSettings {
     SimulatorSettings {
         runs: 64,

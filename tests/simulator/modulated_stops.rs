@@ -1,5 +1,5 @@
-//! Stops of a suburban train as its recorder has them: speeds in steps of 1 km/h once a second, a pause
-//! while the train stands, and drivers who ease the brake at the platform.
+//! Recorded stops of a suburban train: speeds in steps of 1 km/h once a second, a pause while the train stands, and
+//! drivers who ease the brake at the platform.
 
 use std::fmt::Write as _;
 
@@ -11,12 +11,12 @@ use rand::{RngExt, SeedableRng};
 const TRAIN: &str = "[train]\nmass_t = 240\nlength_m = 104\nrotating_mass_factor = 0.08\n\
     [resistance]\na = 1.5\nb = 0.02\nc = 0.0008\n[brake]\nmax_force_kn = 200\n";
 const STEP_S: f64 = 0.02;
-/// At this speed in m/s a driver eases the brake at the platform.
+/// Speed in m/s at which a driver eases the brake at the platform.
 const PLATFORM_MPS: f64 = 1.7;
 /// Time constant in s of the brake.
 const BRAKE_S: f64 = 0.8;
 
-/// One stop as it was.
+/// True values of one stop.
 struct True {
     applied_s: f64,
     from_mps: f64,
@@ -129,8 +129,8 @@ fn study(recording: &str, columns: &str) -> Study {
     Study::new(&dataset, &settings, &[])
 }
 
-/// Every stop is found, as what it was, with its time and distance; how many decelerations lie in
-/// their intervals, of how many.
+/// Checks that every stop is found with its manner, time and distance; returns how many decelerations lie in their
+/// intervals, and the number of all.
 fn compare(study: &Study, truth: &[True], found_by: FoundBy) -> [usize; 2] {
     assert_eq!(study.stops.len(), truth.len());
     let (mut inside, mut looks) = (0, 0);

@@ -1,4 +1,4 @@
-//! The simulator's parts, each by itself.
+//! Tests of single parts of the simulator.
 
 use dynocar_model::simulate::motion::SimulatedMotion;
 use dynocar_model::track::{Track, TrackCurve, Tunnel};

@@ -1,4 +1,4 @@
-//! The simulator obeys physics, its drivers obey the line, and its sensors err as they say.
+//! The simulator obeys physics, its drivers obey the line, and its sensors have the stated errors.
 
 use std::sync::LazyLock;
 

@@ -1,14 +1,14 @@
-//! Two places of resistance close behind one another, and places that a wrong wheel only seems to leave.
+//! Two places of resistance that follow each other closely, and false places caused by a wrong wheel diameter.
 
 use dynocar_analysis::explain::explain;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, TrueEffect, simulate};
 
-/// Of a fast train on 60 km: 2.7 km each, 1.1 km apart, so that the end of one and the start of the other
-/// are felt together.
+/// Seed of a fast train on 60 km with two places of 2.7 km, 1.1 km apart, so that the end of one and the start of the
+/// other act on the train together.
 const SEED: u64 = 97_004;
-/// Largest distance in m of an end from the truth; a sample is 16 m of distance there.
+/// Largest distance in m of an end from the truth; samples are 16 m apart there.
 const END_ERROR_MAX_M: f64 = 30.0;
 
 #[test]

@@ -1,5 +1,5 @@
-//! Input faults in simulated datasets: each is named by `check`, `identify` and `explain`, no
-//! pipeline stays trusted, and nothing is said of data that are right, whatever effect acts.
+//! Input faults in simulated datasets: each is named by `check`, `identify` and `explain`, no pipeline stays trusted,
+//! and right data give no message under any effect.
 
 use std::path::Path;
 use std::process::Command;
@@ -18,18 +18,18 @@ use serde_json::Value;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 
-/// A change of the description that no file contradicts.
+/// A wrong description that no single file contradicts.
 #[derive(Clone, Copy, Debug)]
 enum InputFault {
-    /// Quantities are read this many times too large.
+    /// The values of these quantities are read too large by this factor.
     Scale(&'static [&'static str], f64),
     /// Two columns are exchanged, or the sign of their difference.
     Exchange,
-    /// The masses of the runs.
+    /// The masses of the runs are wrong by this factor.
     Mass(f64),
-    /// The line's gradients.
+    /// The line's gradients are wrong by this factor.
     Gradient(f64),
-    /// The direction of every run.
+    /// The direction of every run is reversed.
     Direction,
 }
 
@@ -202,7 +202,7 @@ fn every_input_fault_is_named_by_check_identify_and_explain_on_the_terminal_and_
             let case = format!("{name}, {}", train_type.name());
             let dataset = dataset::load(folder).unwrap();
             let diagnostic = dataset.diagnostics().into_iter().find(|it| it.code == code).unwrap();
-            // A run on gentle gradients does not show by itself what the others do.
+            // A run on gentle gradients does not show the fault by itself.
             let least = if of_whole_runs.iter().any(|it| it.0 == name) { 2 } else { 3 };
             assert!(diagnostic.runs.len() >= least, "{case}: {diagnostic}");
             let words: String =

@@ -1,5 +1,5 @@
-//! Days of a suburban train as its recorder has them: whole km/h once a second or every two, pauses while the
-//! train stands, brakes eased and applied again, creeping, restrictions and runs that end in motion.
+//! Recorded days of a suburban train: whole km/h every second or every two seconds, pauses while the train stands,
+//! brakes eased and applied again, creeping, restrictions and runs that end in motion.
 
 use std::fmt::Write as _;
 
@@ -12,7 +12,7 @@ const TRAIN: &str = "[train]\nmass_t = 240\nlength_m = 104\nrotating_mass_factor
     [resistance]\na = 1.5\nb = 0.02\nc = 0.0008\n";
 const STEP_S: f64 = 0.05;
 
-/// A stop as it was.
+/// True values of a stop.
 struct True {
     from_s: f64,
     stands_s: f64,
@@ -87,7 +87,7 @@ impl Day {
                 self.hold(20.0, -0.02);
             }
         }
-        // A restriction may be slower than what counts as a stop.
+        // A speed restriction may be slower than the speed below which a stop is assumed.
         if self.speed_mps < 6.5 {
             self.reach(9.0, 0.5);
             self.hold(20.0, 0.0);

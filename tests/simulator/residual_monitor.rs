@@ -1,5 +1,5 @@
-//! The residual monitor on simulated driving: silent while nothing is undeclared, and right about
-//! what is.
+//! The residual monitor on simulated driving: it is silent while no undeclared effect acts, and names the right one
+//! otherwise.
 
 use std::sync::Arc;
 
@@ -190,11 +190,11 @@ fn a_force_by_a_law_of_the_speed_that_no_term_follows_is_said_to_be_unknown() {
 
 #[test]
 fn what_cannot_be_distinguished_is_reported_as_alternatives() {
-    // On a level, straight line another rotating mass does what another mass does.
+    // On a level, straight line another rotating mass acts like another mass.
     let kinds = EffectRequest::Kinds(vec![EffectKind::RotatingMass]);
     let mut settings = SimulatorSettings::new(320, kinds);
     settings.is_level_and_straight = true;
-    // A few % of it lie within what a load is known to: whatever is suspected is never one of them alone.
+    // A few % of it lie within the uncertainty of a load, so the monitor never suspects one of the two kinds alone.
     watch(&simulate(&settings), |run, time_s, snapshot| {
         let is_alone =
             suspect(snapshot) != EffectKind::None && snapshot.alternatives().count() == 0;
@@ -202,8 +202,8 @@ fn what_cannot_be_distinguished_is_reported_as_alternatives() {
     });
 }
 
-/// The first of some datasets whose brake drags with half of Davis a or more: less lies
-/// within what winds and loads do on ordinary days, and is named late or not.
+/// The first of some datasets whose brake drags with half of Davis a or more: a smaller force lies within the effects
+/// of winds and loads on ordinary days, and is named late or not at all.
 fn metro_whose_brake_drags() -> SimulatedDataset {
     let kinds = || EffectRequest::Kinds(vec![EffectKind::DraggingBrake]);
     let is_strong = |data: &SimulatedDataset| {

@@ -9,7 +9,7 @@ use dynocar_tests::simulator::{
     simulate,
 };
 
-/// Kinds that no ordinary error of a declared figure looks like.
+/// Kinds that do not resemble an ordinary error of a declared figure.
 const STRUCTURAL: [EffectKind; 7] = [
     EffectKind::AmbientTemperature,
     EffectKind::TunnelDrag,

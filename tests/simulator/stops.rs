@@ -1,11 +1,11 @@
-//! The law of simulated stops against the true one, and the next stop against its bound.
+//! The estimated law of simulated stops, compared with the true one, and the next stop, compared with its bound.
 
 use dynocar_analysis::stops::{DecelerationCurve, DecelerationLaw, Gradient};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
-/// Friction that grows as the speed falls, as cast-iron blocks have it.
+/// Returns the true deceleration, which grows as the speed falls, as with cast-iron blocks.
 pub fn true_mps2(speed_mps: f64) -> f64 {
     0.3 + 0.7 / (1.0 + speed_mps / 12.0)
 }
@@ -14,8 +14,8 @@ pub fn normal(random: &mut StdRng) -> f64 {
     (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0
 }
 
-/// A stop by a brake of so much of the true deceleration after a dead time of 1 s, at 5 Hz,
-/// with noise and in steps of 0.2 m/s; and its true distance.
+/// Returns the samples of a stop with `factor` times the true deceleration after a dead time of 1 s, at 5 Hz, with
+/// noise and in steps of 0.2 m/s; and its true distance.
 pub fn stop(factor: f64, from_mps: f64, random: &mut StdRng) -> (Vec<TrainSample>, f64) {
     let (mut samples, mut speed_mps, mut distance_m) = (Vec::new(), from_mps, 0.0);
     let step_s = 0.01;

@@ -1,4 +1,4 @@
-//! A simulated railway with GNSS and without a line file, surveyed and explained.
+//! Survey and explanation of a simulated railway with GNSS and without a line file.
 
 use dynocar::dataset;
 use dynocar_analysis::explain::answer::Verdict;
@@ -22,7 +22,7 @@ fn railway(seed: u64, effects: EffectRequest) -> SimulatorSettings {
     }
 }
 
-/// Outcome of a simulated railway.
+/// A simulated railway with its survey and explanation.
 struct Case {
     truth: SimulatedDataset,
     answer: SurveyAnswer,

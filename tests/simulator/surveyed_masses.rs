@@ -13,16 +13,16 @@ use dynocar_tests::simulator::{
 };
 use dynocar_workshop::survey::survey_folder;
 
-/// Samples of a piece of a run, at 5 Hz.
+/// Number of samples, at 5 Hz, of a piece of a run.
 const PIECE: usize = 600;
-/// Lines.
+/// Seeds of the lines.
 const SEEDS: std::ops::Range<u64> = 31..34;
 
 /// Estimators of masses.
 const KINDS: [PipelineKind; 2] = [PipelineKind::MassKalman, PipelineKind::JointLeastSquares];
 
-/// Masses of the pieces of runs held out less the true one, in standard deviations as reported, of each estimator:
-/// with the gradient's uncertainty, and as if nobody had stated it.
+/// Returns the errors of the masses from pieces of held-out runs, in reported standard deviations, by estimator: with
+/// the gradient's uncertainty stated in the line's file, and without it.
 fn errors() -> [[Vec<f64>; KINDS.len()]; 2] {
     let mut both = [const { [const { Vec::new() }; KINDS.len()] }; 2];
     for seed in SEEDS {
@@ -54,7 +54,7 @@ fn errors() -> [[Vec<f64>; KINDS.len()]; 2] {
     both
 }
 
-/// Takes what is stated of the gradient's uncertainty out of a line's file.
+/// Removes the gradient's uncertainty from a line's file.
 fn forget_uncertainty(file: &Path) {
     let mut document: toml::Table = std::fs::read_to_string(file).unwrap().parse().unwrap();
     document["track"].as_table_mut().unwrap().remove("gradient_std");

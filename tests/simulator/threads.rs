@@ -1,4 +1,4 @@
-//! The answer is the same to the last digit whatever the number of threads.
+//! The answer is the same to the last digit for any number of threads.
 
 use std::path::PathBuf;
 
@@ -19,7 +19,7 @@ impl DatasetFiles for Folder {
 fn the_answer_is_the_same_on_one_two_and_three_threads() {
     let demo = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../config/demo");
     let mut dataset = Dataset::load(&Folder(demo)).expect("the demonstration runs");
-    // As if the train were heavier: something is found, and looked for in several rounds.
+    // The forces are those of a heavier train, so that an effect is found, in several rounds of the search.
     for sample in dataset.runs.iter_mut().flat_map(|run| &mut run.samples) {
         let pulled_n = sample.get(dynocar_shared::SampleField::TractionForce);
         if let Some(pulled_n) = pulled_n {

@@ -1,7 +1,7 @@
 //! A headless Chromium that opens pages and reports their state.
 //!
-//! It is spoken to by the DevTools protocol over two pipes (`--remote-debugging-pipe`): messages
-//! of JSON, each ended by a zero byte. No port is opened.
+//! The tests speak with it by the DevTools protocol over two pipes (`--remote-debugging-pipe`): messages of JSON, each
+//! ended by a zero byte. No port is opened.
 
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::process::CommandExt;
@@ -20,7 +20,8 @@ const PATIENCE: Duration = Duration::from_secs(120);
 
 const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 
-/// Opens no sandbox (the tests may run as root), no network of its own, no profile but ours.
+/// Start without sandbox (the tests may run as root), without network access of its own, and with the test's profile
+/// alone.
 const ARGUMENTS: &str = "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run \
     --disable-background-networking --disable-component-update --disable-sync \
     --disable-dev-shm-usage --disable-breakpad --remote-debugging-pipe";
@@ -239,7 +240,7 @@ impl Browser {
             .unwrap_or_else(|error| panic!("the browser does not answer ({awaited}): {error}"))
     }
 
-    /// Takes notice of what the page does.
+    /// Records an event of the page.
     fn note(&mut self, message: &Value) {
         let parameters = &message["params"];
         let text = |value: &Value| value.to_string();

@@ -18,11 +18,11 @@ pub struct Page {
 /// A command that a page shows.
 #[derive(Debug)]
 pub struct Shown {
-    /// The page and the line as it stands there
+    /// The page and the line of the command
     pub place: String,
     /// The words after the program's name
     pub words: Vec<String>,
-    /// Mentioned in a sentence or as a pattern, and then not always complete
+    /// True if the command stands in a sentence or as a pattern, where it may be incomplete
     pub is_mention: bool,
 }
 
@@ -198,7 +198,7 @@ fn words(line: &str) -> Vec<String> {
 }
 
 impl Shown {
-    /// Returns why a command line does not take these words; what a mention leaves out is no reason.
+    /// Returns the error of a command line for these words; a mention may leave out required words.
     pub fn refusal(&self, command: clap::Command) -> Option<String> {
         use ErrorKind::{
             DisplayHelp, DisplayHelpOnMissingArgumentOrSubcommand, DisplayVersion,
@@ -216,7 +216,7 @@ impl Shown {
             {
                 None
             }
-            // A name in capitals stands for what a reader puts in: `--train ID`, `help COMMAND`.
+            // A name in capitals stands for a reader's value: `--train ID`, `help COMMAND`.
             ErrorKind::InvalidValue | ErrorKind::ValueValidation | ErrorKind::InvalidSubcommand
                 if self.is_mention && self.words.iter().any(|it| is_placeholder(it)) =>
             {

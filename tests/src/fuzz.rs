@@ -1,8 +1,8 @@
-//! Mutations of a corpus thrown at everything that reads foreign bytes.
+//! Mutations of a corpus, given to every reader of foreign bytes.
 //!
-//! Blind but seeded, on the stable compiler: bytes are flipped, cut out, doubled, spliced from
-//! other files of the corpus, and replaced by what readers stumble over. An input that makes a
-//! reader panic is written into the corpus, from where every later run starts.
+//! The mutations are random but seeded, and need only the stable compiler: bytes are flipped, cut out, doubled, spliced
+//! from other files of the corpus, and replaced by values that often break readers. An input that makes a reader panic
+//! is written into the corpus, from where every later run starts.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -108,7 +108,7 @@ impl Target {
     ///
     /// # Panics
     ///
-    /// When the reader misbehaves, or accepts what it must not.
+    /// When the reader misbehaves, or accepts an input that it must refuse.
     pub fn feed(self, bytes: &[u8]) -> bool {
         let text = String::from_utf8_lossy(bytes);
         match self {

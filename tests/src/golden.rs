@@ -15,7 +15,7 @@ use dynocar_core::pipeline::Pipeline;
 use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::{ParameterSnapshot, TrainId};
 
-/// Relative difference of final values that another C library may make.
+/// Relative difference of final values that another C library may cause.
 pub const TOLERANCE: f64 = 1e-6;
 
 /// Returns the file's place.
@@ -91,7 +91,7 @@ pub fn without_stamps(snapshot: &ParameterSnapshot) -> ParameterSnapshot {
     }
 }
 
-/// Takes a snapshot into a hash, but for what a daemon's clock stamps on it.
+/// Adds a snapshot to a hash, without the stamps of a daemon's clock.
 fn mix_snapshot(hash: &mut u64, it: &ParameterSnapshot) {
     let floats = it.values.iter().chain(&it.covariance).chain([
         &it.innovation_normalised,

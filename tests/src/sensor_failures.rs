@@ -4,7 +4,7 @@ use dynocar_shared::{SampleField, TrainSample};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// A way to fail.
+/// A way in which sensors or channels fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum SensorFailure {
     /// A quantity is not a number.
@@ -17,13 +17,13 @@ pub enum SensorFailure {
     Quantised,
     /// A quantity takes a far-off value for one sample.
     Spikes,
-    /// The sample never comes.
+    /// The sample is lost.
     Dropouts,
-    /// The time of the sample before, once more.
+    /// The sample has the time of the previous one.
     RepeatedTime,
-    /// A time up to 10 s back.
+    /// The sample has a time up to 10 s earlier.
     ReversedTime,
-    /// One sample's number is up to a million ahead; the next goes on as if nothing was.
+    /// One sample's number is up to a million ahead; the next number continues the old sequence.
     SequenceJump,
     /// Speed in km/h where m/s are expected.
     KilometresPerHour,

@@ -50,7 +50,7 @@ pub fn rust_files(folder: &str) -> Vec<PathBuf> {
     files
 }
 
-/// Returns true for a file that holds nothing but tests, or what tests need.
+/// Returns true for a file that holds only tests or helpers of tests.
 pub fn is_of_tests(path: &Path) -> bool {
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
     name.ends_with("tests") || name == "test_runs"

@@ -1,5 +1,5 @@
-//! A tram from stop to stop, as its controller writes it: electric brakes with a limited change of force, friction to
-//! the stop that follows its report late.
+//! Samples of a tram from stop to stop: an electric brake with a limited change of force, then a friction brake that
+//! follows its report late.
 
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
@@ -8,7 +8,7 @@ use crate::simulator::random::{SimulatorRandom, Stream};
 
 /// Samples per second.
 pub const RATE_HZ: u32 = 20;
-/// Mass in kg as the train is declared.
+/// Declared mass in kg.
 const TARE_KG: f64 = 38e3;
 /// Mass in t with the passengers.
 pub const LOADED_T: f64 = 43.0;

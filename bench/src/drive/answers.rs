@@ -1,4 +1,4 @@
-//! From what the daemon says may be used to what the driver drives by, and whether that was right.
+//! Conversion of the daemon's usable answers into the driver's parameters, and the errors of these answers.
 
 use dynocar_model::train::Davis;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
@@ -33,7 +33,7 @@ pub fn learned<'a>(
     {
         let davis = [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC];
         let [a, b, c] = davis.map(|parameter| snapshot.value(parameter).unwrap_or_default());
-        // The resistance is that of still air; what the wind adds today is the unexplained force.
+        // The estimated resistance is that of still air; the wind of the day is part of the unexplained force.
         let weight_kn = 1e-3 * known.mass_kg.value * STANDARD_GRAVITY_MPS2;
         let [unexplained, std] = [snapshot.unexplained_force_n, snapshot.unexplained_force_std_n]
             .map(|force_n| force_n / weight_kn);
@@ -95,8 +95,8 @@ impl AnswerMemory {
     }
 }
 
-/// Takes in a cycle of the moving train: what is declared and what was learned, in the order of [`ASKED`]; brake and
-/// adhesion count while the train brakes.
+/// Adds a cycle of the moving train to the scores of the declared and the learned parameters, in the order of
+/// [`ASKED`]; brake and adhesion count while the train brakes.
 pub fn count(
     scores: &mut [QuantityScore; 4],
     train: &Train,

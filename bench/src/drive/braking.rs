@@ -7,14 +7,14 @@ use super::knowledge::{Ability, Knowledge};
 const SOFT_MPS: f64 = 3.0;
 /// Share of the deceleration that is left at standstill.
 const END_SHARE: f64 = 0.4;
-/// Share of the deceleration that brake and rail allow with which an ordinary stop is planned.
+/// Share of the deceleration possible with brake and rail that the plan of an ordinary stop uses.
 const PLANNED_SHARE: f64 = 0.85;
 
 /// Deceleration over speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrakingCurve {
     full_mps2: f64,
-    /// Distance in m from where it eases off.
+    /// Distance in m from the point where the deceleration begins to ease off to standstill.
     soft_m: f64,
 }
 
@@ -75,7 +75,7 @@ impl BrakingCurve {
         0.5 * (low + high)
     }
 
-    /// Returns the deceleration in m/s² at standstill, and what it gains for each m/s.
+    /// Returns the deceleration in m/s² at standstill, and its increase for each m/s of speed.
     fn soft(&self) -> (f64, f64) {
         (self.full_mps2 * END_SHARE, self.full_mps2 * (1.0 - END_SHARE) / SOFT_MPS)
     }

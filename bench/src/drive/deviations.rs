@@ -16,11 +16,11 @@ use crate::scenarios::world::{LoadSource, Mistakes, Scenario, Traffic, World};
 pub struct Condition {
     /// In words.
     pub name: &'static str,
-    /// Exerted brake force over what its pressure says.
+    /// Exerted brake force over the force that belongs to the cylinder pressure.
     brake_scale: f64,
     /// True where the rail is wet, and mostly more slippery than the law says.
     is_wet: bool,
-    /// True where the daemon is killed in the middle of a leg, and another one comes.
+    /// True where the daemon is killed in the middle of a leg, and another one is started.
     pub daemon_dies: bool,
 }
 
@@ -41,7 +41,7 @@ pub const CONDITIONS: [Condition; 5] = [
     Condition { name: "daemon dies", daemon_dies: true, ..ORDINARY },
 ];
 
-/// A row of the table: kind of traffic and what is particular.
+/// A row of the table: kind of traffic and its deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Service {
     /// Kind of traffic.

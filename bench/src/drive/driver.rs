@@ -1,25 +1,25 @@
 //! An automatic driver: it plans for the timetable, tracks the plan, and brakes along a curve to the
 //! stopping point.
 //!
-//! Integral action is an estimate of the acceleration that the parameters do not explain, from the
-//! reported forces and the measured speed: it makes up for wrong parameters within seconds. Forces act
-//! late, so what is commanded is for the place and speed of then. When parameters change, that estimate
-//! changes with them, so that the force does not jump.
+//! The integral action is an estimate of the acceleration that the parameters do not explain, from the reported forces
+//! and the measured speed: it makes up for wrong parameters within seconds. Forces act late, so each command is
+//! computed for the place and speed at which it will act. When the parameters change, the estimate changes with them,
+//! so that the force does not jump.
 
 use super::braking::BrakingCurve;
 use super::knowledge::{Ability, Knowledge};
 use super::plan::{COASTING_MIN_SHARE, DrivePlan, PlannedLeg, Planner};
 
-/// Bandwidth in rad/s of the estimate of speed and of what is not explained, at most.
+/// Greatest bandwidth in rad/s of the estimates of the speed and of the unexplained acceleration.
 const OBSERVER_RAD_PER_S: f64 = 0.8;
-/// Weight in 1/s of the measured place.
+/// Gain in 1/s with which the measured place corrects the estimated one.
 const PLACE_PER_S: f64 = 1.0;
 /// Share of the inverse of the lag that corrects an error of the speed, per s.
 const SPEED_GAIN: f64 = 0.4;
-/// Plans on a leg, and the shortest time in s between two.
+/// Number of plans on a leg, and the shortest time in s between two plans.
 const PLANS: f64 = 12.0;
 const REPLAN_MIN_S: f64 = 5.0;
-/// Lateness in s from which a coasting train is pulled again, and as a share of the running time.
+/// Delay from which a coasting train applies traction again: in s, and as a share of the running time.
 const LATE: (f64, f64) = (1.5, 0.01);
 /// Deceleration in m/s² of a train that is too fast without having to stop.
 const REGULATING_MPS2: f64 = 0.3;
@@ -64,7 +64,7 @@ pub struct LegDriver {
     at_m: f64,
     speed_mps: f64,
     unexplained_mps2: f64,
-    /// Acceleration in m/s² that the reported force should give with what is not explained.
+    /// Acceleration in m/s² expected from the reported force and the unexplained acceleration.
     acceleration_mps2: f64,
     commanded_mps2: f64,
 }
@@ -107,7 +107,7 @@ impl LegDriver {
         &self.leg
     }
 
-    /// Returns the force in N, braking negative, for what is measured and known.
+    /// Returns the force in N, negative for braking, from the measurements and the driver's knowledge.
     pub fn force_n(&mut self, measured: &DriverMeasurements, knowledge: &Knowledge) -> f64 {
         self.take_over(measured, knowledge);
         self.observe(measured);
@@ -208,7 +208,7 @@ impl LegDriver {
             self.knowledge.acceleration_mps2(0.0, speed_mps, slope) + self.unexplained_mps2;
         let towards = |target_mps: f64| (gain * (target_mps - speed_mps)).max(-REGULATING_MPS2);
         match self.phase {
-            // Whoever is too fast coasts, and brakes only for the highest speed.
+            // A train that is too fast coasts; it brakes only where it exceeds the highest speed.
             Phase::Driving | Phase::Coasting => {
                 let share = if self.phase == Phase::Driving { 1.0 } else { COASTING_MIN_SHARE };
                 let least = towards(share * self.plan.cruise_mps);

@@ -11,26 +11,27 @@ use super::knowledge::Knowledge;
 use super::plan::{PlannedLeg, Planner};
 use super::train::Train;
 
-/// Running time of the timetable over the shortest one with declared parameters, and s on top.
+/// Running time of the timetable: its ratio to the shortest one with declared parameters, and the seconds added to
+/// that.
 const TIMETABLE: (f64, f64) = (1.08, 3.0);
-/// Confidence of the bounds.
+/// Confidence of the bounds of the stopping distance.
 pub const CONFIDENCE: f64 = 0.99;
 /// Adhesion that a controller assumes where it knows nothing of the rail: a wet one, usually more slippery than the
 /// law says.
 const UNKNOWN_RAIL: RailAdhesion = RailAdhesion::Law(RailCondition::Wet, Uncertain::new(0.8, 0.12));
-/// Brake and rail of the fixed worst case.
+/// Exerted over reported brake force, and scale of the adhesion law, in the fixed worst case.
 const WORST: (f64, f64) = (0.7, 0.45);
 /// Greatest mass over the declared one in the fixed worst case.
 const WORST_LOAD: f64 = 1.35;
 /// Time in s over which a change of acceleration is felt.
 const FELT_S: f64 = 0.5;
-/// Time in s within a braking at which its bound is looked at again.
+/// Time in s after the start of a braking at which its bound is computed again.
 const SECOND_LOOK_S: f64 = 5.0;
 
-/// A bound beside the truth.
+/// A bound of the stopping distance, and the true distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
-    /// The bound by what the driver knows, in m; `None` where there is none.
+    /// The bound in m from the driver's knowledge; `None` where it gives no bound.
     pub bound_m: Option<f64>,
     /// The bound of the fixed worst case in m.
     pub fixed_m: f64,
@@ -115,9 +116,9 @@ impl Journey {
         self.running_s
     }
 
-    /// One cycle by known parameters.
+    /// Runs one cycle with known parameters.
     ///
-    /// The driver drives by `knowledge`; `sure` is what bounds a stop.
+    /// The driver drives by `knowledge`; `sure` gives the bound of a stop.
     pub fn proceed(&mut self, sample: &TrainSample, knowledge: &Knowledge, sure: &Knowledge) {
         let cycle_s = self.train.service.cycle_s();
         if self.driver.is_some() {
@@ -133,7 +134,7 @@ impl Journey {
     fn depart(&mut self, sample: &TrainSample, knowledge: &Knowledge, cycle_s: f64) {
         let (leg, ability) = (self.train.leg(), self.train.ability.clone());
         let declared = self.declared(sample);
-        // The timetable is that of the declared load, whatever it weighs today.
+        // The timetable is made for the declared mass, not for the mass of the day.
         let usual =
             Knowledge { mass_kg: Uncertain::exact(self.train.declared.mass_kg), ..declared };
         let start = (0.0, 0.0);

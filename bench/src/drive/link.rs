@@ -1,6 +1,6 @@
-//! Trains whose drivers ask a daemon, a process of its own: each cycle every train's sample goes through
-//! its channel, and nobody drives on before every pipeline has answered it. So the daemon misses
-//! nothing, however much faster than real time it goes, and a seed gives the same figures on any machine.
+//! Trains whose drivers ask a daemon in a separate process. In each cycle every train's sample goes through its
+//! channel, and the drivers wait until every pipeline has answered it. So the daemon misses no sample, however much
+//! faster than real time the simulation runs, and a seed gives the same figures on any machine.
 
 use dynocar::config::IdleStrategy;
 use dynocar_client::{Reading, SamplePublisher, SnapshotReader};
@@ -20,10 +20,10 @@ const KINDS: [PipelineKind; 4] = [
     PipelineKind::BrakeSmoother,
     PipelineKind::ResidualMonitor,
 ];
-/// The simulated clock is not the host's: a busy machine makes no daemon silent.
+/// The simulated clock is not the host's: on a busy machine the daemon must not seem silent.
 const NEVER_STALE_NS: i64 = 600_000_000_000;
 
-/// A controller's two ends.
+/// A controller's ends of its two channels.
 struct Ends {
     reader: SnapshotReader,
     publisher: SamplePublisher,
@@ -83,8 +83,7 @@ impl Link {
         Ok(())
     }
 
-    /// Kills the daemon without a warning; what it has said can still be read until
-    /// [`Link::notice_silence`].
+    /// Kills the daemon without a warning; its last answers can still be read until [`Link::notice_silence`].
     pub fn kill_daemon(&mut self) {
         self.daemon = None;
     }

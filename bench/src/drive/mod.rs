@@ -6,10 +6,10 @@
 //! - [`braking`]: the braking curve to the stopping point
 //! - [`plan`]: the line as the map has it, and the speed profile for the timetable with the least energy
 //! - [`driver`]: tracking the plan and the braking curve
-//! - [`mod@line`]: brakes, rails, wind, tunnels, curves and loads beside the world of ordinary mistakes
-//! - [`train`]: the train, whose truth nobody knows
+//! - [`deviations`]: brakes, rails, wind, tunnels, curves and loads that the world of ordinary mistakes lacks
+//! - [`train`]: the simulated train, whose true parameters no estimator sees
 //! - [`journey`]: a train and its driver from stop to stop
-//! - [`link`]: channels to a daemon of its own, in lock-step
+//! - [`link`]: channels to a separate daemon, in lock-step
 //! - [`run`]: all trains of a service with one kind of parameters
 //! - [`score`], [`picture`]: the result
 

@@ -12,7 +12,7 @@ const COLORS: [RGBColor; 3] =
     [RGBColor(176, 176, 176), RGBColor(31, 119, 180), RGBColor(44, 160, 44)];
 const NAMES: [&str; 3] = ["declared parameters", "with Dynocar", "true parameters"];
 
-/// Title, place among the statistics, and factor and shift of what is drawn.
+/// Title, place among the statistics, and factor and shift of the drawn value.
 const PANELS: [(&str, usize, f64, f64); 3] = [
     ("stopping error in cm (rms)", STOP_RMS, 100.0, 0.0),
     ("off the timetable in s", LATE, 1.0, 0.0),
@@ -23,7 +23,7 @@ const PANELS: [(&str, usize, f64, f64); 3] = [
 ///
 /// # Errors
 ///
-/// When it cannot be drawn.
+/// When the picture cannot be drawn.
 pub fn svg(scored: &[&Scored]) -> Result<String, BenchError> {
     let mut text = String::new();
     {

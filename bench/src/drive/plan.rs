@@ -9,7 +9,7 @@ use super::knowledge::{Ability, Knowledge};
 /// Length in m of a piece of the map.
 pub const PIECE_M: f64 = 10.0;
 
-/// A way from stop to stop; distances count from where the train starts.
+/// A leg from stop to stop; distances count from its start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlannedLeg {
     /// Distance to the stopping point in m.

@@ -12,19 +12,19 @@ use crate::ending;
 use crate::output::BenchError;
 use crate::scenarios::score::QuantityScore;
 
-/// By which parameters the driver drives.
+/// Source of the driver's parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Informant {
-    /// As declared.
+    /// The declared parameters.
     Declared,
-    /// As the daemon says, where it may be used.
+    /// The daemon's answers where they are usable, else the declared parameters.
     Dynocar,
-    /// The true ones: what is attainable.
+    /// The true parameters: the best attainable result.
     Truth,
 }
 
 impl Informant {
-    /// All of them, in words.
+    /// All sources with their names.
     pub const ALL: [(Informant, &str); 3] = [
         (Informant::Declared, "declared"),
         (Informant::Dynocar, "dynocar"),
@@ -55,7 +55,7 @@ pub struct DrivenRecord {
     pub scores: [QuantityScore; 4],
 }
 
-/// A train on its way, with what its driver keeps of the daemon's answers.
+/// A train on its way, with the daemon's answers that its driver keeps.
 struct Driving {
     journey: Journey,
     memory: AnswerMemory,

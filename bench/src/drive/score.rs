@@ -9,12 +9,12 @@ use crate::output::Record;
 use crate::scenarios::score::{QuantityScore, Scores};
 use crate::statistics::{mean, quantiles};
 
-/// Draws of the trains behind an interval.
+/// Number of random selections of the trains behind an interval.
 const DRAWS: usize = 400;
-/// A leg counts for the energy where every driver stops so near in m: else it is not the same service.
+/// Greatest stopping error in m of a leg whose energy counts: if a driver stops farther off, the legs do not compare.
 const SAME_STOP_M: f64 = 1.0;
 /// Statistics of a service's legs: mean and standard deviation of the place beyond the stopping point in m, stops
-/// within 0.3 and 0.5 m in %; then what is compared, of which less is better.
+/// within 0.3 and 0.5 m in %; then the compared measures, of which less is better.
 const STATISTICS: usize = 8;
 /// Compared measures: name, place among the statistics, and the difference that nobody would notice.
 const MEASURES: [(&str, usize, f64); 4] = [

@@ -19,7 +19,7 @@ use crate::scenarios::world::{LoadSource, Mistakes, WEIGHING_STD, World};
 const STEP_MAX_S: f64 = 0.02;
 /// Standard deviation in m of the balises' places before a stop.
 const BALISE_STD_M: f64 = 0.08;
-/// Mean time in s by which acting forces are later than reported ones.
+/// Mean time in s by which forces act later than they are reported.
 const MEAN_DELAY_S: f64 = Mistakes::USUAL.mean_delay_s;
 
 /// A train on its line.
@@ -45,7 +45,7 @@ pub struct Train {
     weighed_kg: f64,
     brake_scale: f64,
     balise_m: f64,
-    /// Traction minus brake force in N as reported, and what is reported and acts later.
+    /// Reported traction minus brake force in N, and the reported forces that do not act yet.
     reported_n: f64,
     on_its_way_n: VecDeque<f64>,
     cycles: u64,
@@ -89,7 +89,7 @@ impl Train {
         train
     }
 
-    /// Passengers or goods come and go; every leg has its own chance, whoever drives.
+    /// Changes the load; every leg draws from its own seed, so that the load does not depend on the driver.
     fn load(&mut self) {
         self.legs += 1;
         let of_leg = self.seed ^ self.legs.wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -112,7 +112,7 @@ impl Train {
         self.energy_j = 0.0;
     }
 
-    /// The train stands at a stop: what lies ahead is the next leg.
+    /// Turns the train, which stands at a stop, to the next leg.
     pub fn turn_to_next(&mut self) {
         self.start_m = self.chainage_m();
         self.motion = SimulatedMotion { distance_m: 0.0, speed_mps: 0.0 };

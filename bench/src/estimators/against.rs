@@ -15,8 +15,8 @@ use crate::output::{BenchError, Record};
 /// Rounds of both programs.
 const ROUNDS: usize = 31;
 
-/// Measures the cases whose name contains `case` in this program and in another: the median times of an update in
-/// ns, and over the rounds the medians of what this build takes more and of its time over the other's.
+/// Measures the cases whose name contains `case` in this program and in another: the median times of an update in ns,
+/// and over the rounds the medians of the difference and of the ratio of this build's time to the other's.
 ///
 /// # Errors
 ///
@@ -25,7 +25,7 @@ pub fn measure(other: &Path, case: &str) -> Result<Vec<Record>, BenchError> {
     let ours = std::env::current_exe()?;
     let mut rounds: Vec<[Vec<(String, f64)>; 2]> = Vec::with_capacity(ROUNDS);
     for round in until_due(0..ROUNDS) {
-        // Who is first turns from round to round.
+        // The program that runs first alternates from round to round.
         let (first, then) = if round % 2 == 0 { (&*ours, other) } else { (other, &*ours) };
         match times(first, case).and_then(|first| Ok([first, times(then, case)?])) {
             // The same signal ends the programs of the round.

@@ -20,7 +20,7 @@ const SAMPLES: usize = 40;
 const WINDOWS: u64 = 8;
 /// Steps in a pass of the filter.
 const STEPS: usize = 199;
-/// Samples that the smoothed estimate lies back.
+/// Number of samples by which the smoothed estimate lags.
 const LAG: usize = 25;
 /// Noise of motion and measurement (Xie 2019), as variances.
 const NOISE: MotionNoise = MotionNoise {

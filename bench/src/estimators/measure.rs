@@ -1,6 +1,6 @@
 //! Timing of an estimator, in rounds.
 //!
-//! The clock is the thread's processor time: what other programs take meanwhile does not count.
+//! The clock is the thread's processor time, without the time of other programs.
 
 use std::hint::black_box;
 use std::time::Duration;
@@ -14,7 +14,7 @@ use crate::statistics::quantiles;
 pub struct EstimatorCase {
     /// Its name, in the table and in JSON.
     pub name: String,
-    /// Time of an update in ns that is aimed at.
+    /// Target for the time of an update in ns.
     target_ns: Option<f64>,
     /// Updates in a pass.
     updates: usize,
@@ -22,7 +22,7 @@ pub struct EstimatorCase {
     pass: Box<dyn FnMut()>,
 }
 
-/// How long to measure.
+/// Extent of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
     /// Rounds.
@@ -44,7 +44,7 @@ pub fn quartiles(values: Vec<f64>) -> [f64; 3] {
 }
 
 impl EstimatorCase {
-    /// Returns a case by its name, the updates in a pass, and a pass, which gives what was estimated.
+    /// Returns a case from its name, the number of updates in a pass, and the pass, which returns its estimates.
     pub fn new<T>(
         name: impl Into<String>,
         updates: usize,
@@ -54,14 +54,14 @@ impl EstimatorCase {
         EstimatorCase { name: name.into(), target_ns: None, updates, pass }
     }
 
-    /// With an aim in ns.
+    /// Returns the case with a target in ns.
     #[must_use]
     pub fn aim(self, target_ns: f64) -> Self {
         EstimatorCase { target_ns: Some(target_ns), ..self }
     }
 
-    /// Warms up and measures: the median time of an update over the rounds, half the distance of its quartiles, and
-    /// what is aimed at.
+    /// Warms up and measures: the median time of an update over the rounds, half the distance of its quartiles, and the
+    /// target.
     pub fn measure(mut self, effort: &Effort) -> Record {
         let mut passes = 1;
         while self.time(passes) < effort.slice {

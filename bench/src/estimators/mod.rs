@@ -3,7 +3,7 @@
 //! - [`measure`]: rounds, medians, the table
 //! - [`least_squares`], [`trajectory`], [`braking`]: parts of estimators
 //! - [`pipelines`]: every kind of pipeline from sample to snapshot, and the filter of the mass
-//! - [`against`]: another build of the program beside this one
+//! - [`against`]: another build of the program compared with this one
 
 pub mod against;
 pub mod braking;

@@ -20,7 +20,7 @@ use super::measure::EstimatorCase;
 use crate::papers::braking;
 use crate::rig::pipelines::{default_pipeline, resolving};
 
-/// The files of the dataset that is measured on.
+/// The files of the dataset over which the pipelines run.
 const FILES: &[(&str, &str)] = &[
     ("dataset.toml", include_str!("../../../config/demo/dataset.toml")),
     ("train.toml", include_str!("../../../config/demo/train.toml")),

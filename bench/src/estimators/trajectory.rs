@@ -106,7 +106,7 @@ fn step_of_one((steps, speeds_mps): &Run) -> Vector3<f64> {
     filter.davis_covariance().diagonal()
 }
 
-/// As the pipeline runs it, with what is published after each step or without.
+/// Runs the filter as the pipeline does, with or without the values that are published after each step.
 fn step_of_filter(
     (steps, speeds_mps): &Run,
     learns_noise: bool,

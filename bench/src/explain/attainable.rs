@@ -1,4 +1,5 @@
-//! Best attainable result of any search: the true law with its numbers, and a, b, c, estimated from the same runs.
+//! Best attainable result of any search: the true law, whose numbers are estimated together with a, b, c from the same
+//! runs.
 
 use std::sync::Arc;
 
@@ -11,7 +12,7 @@ use dynocar_model::terms::Parameter;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::{Around, Law, SimulatedDataset, TrueEffect, Unlisted};
 
-/// Half the difference of speeds in m/s that a law's slope is taken over.
+/// Half the difference of the speeds in m/s between which the slope of a law is taken.
 const SLOPE_OVER_MPS: f64 = 0.01;
 
 /// A law of the simulator whose numbers are estimated.

@@ -23,7 +23,7 @@ pub struct SimulatedCase {
     pub scenario: ExplainScenario,
     /// The seed.
     pub seed: u64,
-    /// The world it happens in.
+    /// The simulated world.
     pub world: ExplainWorld,
     /// Number of runs, a quarter of them held out.
     pub runs: usize,
@@ -55,7 +55,7 @@ impl SimulatedCase {
     }
 }
 
-/// The simulated datasets of a command, and what becomes of its result.
+/// The simulated datasets of a command, and the destination of its result.
 #[derive(Debug, Args)]
 pub struct FamilyArguments {
     /// Simulated datasets for each kind
@@ -106,7 +106,7 @@ impl FamilyArguments {
         scenarios.iter().flat_map(of).collect()
     }
 
-    /// Does the work on every case until the command is to end; gives what came of it by scenario.
+    /// Does the work on every case until the command is to end; returns the results by scenario.
     pub fn over<R: Clone + Send>(
         &self,
         scenarios: &[ExplainScenario],

@@ -29,9 +29,9 @@ pub struct Grade {
     pub ends_held: Vec<bool>,
     /// Relative errors of the parameters and whether their 95 % intervals hold the truth.
     pub parameters: Vec<ParameterGrade>,
-    /// The same of what the runs held out say by themselves.
+    /// The same for the estimates from the held-out runs alone.
     pub held_out: Vec<ParameterGrade>,
-    /// Of every effect that they show, the probability of another size in them where it is the same.
+    /// For every effect, the p-value of its size in the held-out runs if it is the same as in the fitted runs.
     pub held_out_chances: Vec<f64>,
     /// Evidence, error reduction and parameters of the named effects, for people.
     pub details: Vec<String>,
@@ -97,7 +97,7 @@ pub fn grade(
     }
 }
 
-/// Returns whether the answer names what acts, and nothing else.
+/// Returns whether the answer names the effects that act, and no others.
 fn is_exactly(
     simulated: &SimulatedDataset,
     competing: Option<(EffectKind, bool)>,

@@ -1,10 +1,10 @@
 //! `dynocar explain` over seeded simulations of every kind of effect and of nulls.
 //!
 //! - [`scenario`]: the simulated effects and the usual errors
-//! - [`family`]: which datasets of it
+//! - [`family`]: the simulated datasets of a scenario
 //! - [`grade`]: the answer against the truth
 //! - [`attainable`]: the error of the true law with estimated numbers
-//! - [`parameters`]: its numbers and places against the true ones
+//! - [`parameters`]: numbers and places of an answer against the true ones
 //! - [`matrix`]: all kinds over all seeds, in numbers
 //! - [`growth`]: time for 1, 4 and 16 times the data
 

@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::statistics::mean;
 
-/// One parameter.
+/// Grade of one parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterGrade {
     /// Its name.
@@ -67,8 +67,8 @@ pub fn graded(
     together.into_iter().chain(singly).chain(mass_factors(&truths, own, simulated)).collect()
 }
 
-/// Returns the error of the gradient at every node that was found, over the root mean square of the effect. All that
-/// the map lacks is true there: the effect, and what usual surveys leave.
+/// Returns the error of the gradient at every node that was found, over the root mean square of the effect. The true
+/// error holds all that the map lacks: the effect, and the usual errors of surveys.
 fn gradient_errors(
     profile: &[(f64, f64)],
     own: &Value,
@@ -119,7 +119,7 @@ fn load_of_the_day(simulated: &SimulatedDataset, file: &str) -> f64 {
     loads.iter().map(|(_, load)| load).sum::<f64>() / loads.len() as f64
 }
 
-/// Lists of masses: their name, the names of both ends, and what entries that can be compared have in common.
+/// Lists of masses: the name of the list, of the two ends, and of the key whose value comparable entries share.
 const MASS_LISTS: [[&str; 4]; 2] =
     [["sections", "from_m", "to_m", "direction"], ["windows", "t_start_s", "t_end_s", "run"]];
 

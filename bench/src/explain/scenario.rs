@@ -6,10 +6,10 @@ use dynocar_tests::simulator::{
     Defects, EffectRequest, Law, SimulatorSettings, TrainType, TrueDeviations, TrueEffect, Unlisted,
 };
 
-/// A world that effects happen in.
+/// The simulated world in which an effect acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ExplainWorld {
-    /// Everything but the effect is as declared, to a good survey and calibrated sensors.
+    /// Everything but the effect is as declared, within the errors of a good survey and of calibrated sensors.
     Plain,
     /// Trains of cars on couplings, in a wind of each day.
     Coupled,
@@ -20,7 +20,7 @@ pub enum ExplainWorld {
 }
 
 impl ExplainWorld {
-    /// By how much things are wrong in it.
+    /// Returns the size of the deviations in this world.
     pub fn deviations(self) -> TrueDeviations {
         match self {
             ExplainWorld::Plain => TrueDeviations::PLAIN,
@@ -30,7 +30,7 @@ impl ExplainWorld {
         }
     }
 
-    /// Returns the kinds that are in this world, small, whatever else acts: to name them is no error.
+    /// Returns the kinds of the small effects that always act in this world: an answer may name them.
     pub fn everyday(self) -> &'static [EffectKind] {
         // The last is a deviation of the rougher world alone.
         const KINDS: [EffectKind; 9] = [

@@ -1,4 +1,4 @@
-//! Cases of the latency measurement, and which are measured together.
+//! Cases of the latency measurement, and the sets of cases that are measured together.
 
 use dynocar::config::IdleStrategy;
 use dynocar_shared::PipelineKind;
@@ -12,7 +12,7 @@ use crate::rig::pipelines;
 pub struct LatencyCase {
     /// `floor`, `dynocar/<pipeline>` or `alternative/<transport>`.
     pub name: String,
-    /// Who answers, and what is beside it.
+    /// The answering side, and the programs and candidates beside it.
     pub setting: Setting,
 }
 
@@ -42,7 +42,7 @@ impl LatencyCase {
         LatencyCase { name, setting: Setting { companions, candidates, ..setting } }
     }
 
-    /// Returns its name with what it does while no sample comes.
+    /// Returns its name with its idle strategy.
     pub fn label(&self) -> String {
         format!("{} ({})", self.name, self.setting.idle)
     }
@@ -89,7 +89,7 @@ pub fn cases(is_quick: bool) -> Vec<LatencyCase> {
     cases
 }
 
-/// Returns the cases with other readers, for whoever has built their programs.
+/// Returns the cases with other readers, whose programs must have been built.
 pub fn cases_with_readers() -> Vec<LatencyCase> {
     use Companion::{Live, Recorder};
     let all: [(&str, &[Companion]); 3] =

@@ -1,9 +1,8 @@
 //! `dynocar-bench latency`: from the appointed time of a sample to the poll that brings its
 //! snapshot, through real processes on cores of their own.
 //!
-//! Every round goes through all cases once, in an order drawn anew from the seed, so that whatever
-//! else the machine does falls on all of them alike. Ratios to the floor are taken within a round;
-//! the median of the rounds is reported.
+//! Every round goes through all cases once, in an order drawn anew from the seed, so that the other work of the machine
+//! falls on all of them alike. Ratios to the floor are taken within a round; the median of the rounds is reported.
 //!
 //! - [`case`]: cases that are measured together, and the other readers of their channels
 //! - [`costs`]: one poll and one publish
@@ -28,7 +27,7 @@ use crate::open_loop::trial::{Extent, run};
 use crate::output::{BenchError, OutputArguments, expect};
 use crate::rig::cores::{CoreArguments, Cores, bind, in_thread, prioritise};
 
-/// Sample → snapshot through real processes, compared with the floor and what a user would pick else.
+/// Sample → snapshot through real processes, compared with the floor and with alternatives.
 #[derive(Debug, Args)]
 pub struct LatencyArguments {
     /// Few short rounds of the main cases: a check that everything runs, not a measurement

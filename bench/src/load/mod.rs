@@ -21,7 +21,7 @@ use crate::output::{BenchError, OutputArguments, expect, named, table};
 use crate::rig::cores::{CoreArguments, Cores};
 use crate::rig::pipelines;
 
-/// Synthetic trains against one daemon: what is used, refused and lost, and how late.
+/// Synthetic trains against one daemon: samples used, refused and lost, and their latency.
 #[derive(Debug, Args)]
 pub struct LoadArguments {
     /// A short trial: a check that everything runs, not a measurement

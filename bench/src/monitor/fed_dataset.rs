@@ -10,9 +10,9 @@ use dynocar_tests::simulator::{SimulatedDataset, SimulatedRun, TrueEffect};
 
 use crate::rig::pipelines::default_pipeline;
 
-/// A train that is slower shows little of anything.
+/// Speed in m/s below which a train shows little of any effect.
 const MOVING_MPS: f64 = 2.0;
-/// Share of the reported brake force below which the rail does not carry it.
+/// Ratio of acting to reported brake force below which the adhesion limits the force.
 const CARRIED_SHARE: f64 = 0.9;
 /// A longer step in s between samples is a gap, not driving.
 const STEP_MAX_S: f64 = 5.0;

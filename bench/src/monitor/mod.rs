@@ -1,7 +1,7 @@
 //! The residual monitor over seeded simulations: the delay until it names an effect that begins to act, the time for
 //! which it names one that does not act, and its false alarms.
 //!
-//! - [`watch`]: one simulated dataset, fed sample by sample
+//! - [`fed_dataset`]: one simulated dataset, fed sample by sample
 
 pub mod fed_dataset;
 

@@ -14,7 +14,7 @@ use crate::output::BenchError;
 use crate::rig::quantiles::{histogram, record};
 use crate::rig::site::require;
 
-/// Samples in flight that are distinguished; at 10 kHz more than a second.
+/// Number of samples in flight that are distinguished; at 10 kHz those of more than a second.
 const IN_FLIGHT: usize = 1 << 14;
 /// How long a peer may take to answer its first sample.
 const READY_WITHIN: Duration = Duration::from_secs(20);
@@ -35,7 +35,7 @@ pub struct TrialOutcome {
     /// From the appointed time of a sample to the poll that brought a snapshot behind which it
     /// stands. A controller or daemon that was held up pays for every sample it kept waiting.
     pub from_appointed: Histogram<u64>,
-    /// From the moment before publishing: what a closed loop would measure.
+    /// From the moment before publishing, as a closed loop would measure.
     pub from_publish: Histogram<u64>,
 }
 
@@ -135,7 +135,7 @@ impl Controller {
         Ok(left_ns - appointed_ns)
     }
 
-    /// Publishes what is due; gives how late the latest was, in ns.
+    /// Publishes the samples that are due; returns the greatest lateness in ns.
     fn publish_due(&mut self, now_ns: i64) -> Result<i64, BenchError> {
         let mut lag_ns = 0;
         while let Some(&(sample, appointed_ns)) =
@@ -151,8 +151,8 @@ impl Controller {
         self.answers.iter().all(|[now, _]| now.newest >= self.sent)
     }
 
-    /// Takes what has come, unless nothing can; true where it brought anything new. An answer to a sample answers those
-    /// before it too, for a snapshot stands on all of them.
+    /// Takes the snapshots that have come, unless none can come; returns whether one was new. An answer to a sample
+    /// answers the earlier samples too, for a snapshot rests on all of them.
     fn poll(&mut self, outcomes: &mut [TrialOutcome]) -> Result<bool, BenchError> {
         if !self.wire.carries_others() && self.is_answered() {
             std::hint::spin_loop();
@@ -183,8 +183,8 @@ impl Controller {
     }
 }
 
-/// Publishes what is due and polls the trains in turn until a time in ns, or until it is over before; gives how late
-/// the latest sample left, in ns.
+/// Publishes the samples that are due and polls the trains in turn until a time in ns, or until `is_over` is set;
+/// returns the greatest lateness of a sample in ns.
 ///
 /// # Errors
 ///

@@ -1,5 +1,5 @@
-//! The open loop that latency and load measure by: samples leave at their appointed times, whatever has come back,
-//! through real processes on cores of their own.
+//! The open loop that latency and load measure by: samples leave at their appointed times, even if earlier answers are
+//! missing, through real processes on cores of their own.
 //!
 //! - [`traffic`]: a train's samples, when they leave, and which are bad
 //! - [`wire`]: the controller's end of each transport

@@ -22,7 +22,7 @@ pub const COMPARED: PipelineKind = PipelineKind::RegularisedRls;
 /// How long a blocking receive waits before anything else is looked at again.
 pub(super) const BLOCK: Duration = Duration::from_millis(1);
 
-/// Which end of a socket.
+/// The two ends of a socket.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SocketEnd {
     /// Sends samples.
@@ -33,7 +33,7 @@ pub enum SocketEnd {
 
 /// An end of a socket that carries whole messages.
 pub trait Socket {
-    /// Sends a message to whoever reads: what nobody takes is lost.
+    /// Sends a message to the reader; a message that is not taken is lost.
     ///
     /// # Errors
     ///

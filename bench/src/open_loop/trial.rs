@@ -19,7 +19,7 @@ use crate::rig::pipelines;
 use crate::rig::site::{DaemonPlan, ThreadPlan, peer, put_candidates, require, site, stop};
 use crate::rig::usage;
 
-/// Who answers.
+/// The answering side.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Answerer {
     /// An echo on the daemon's channels, with no daemon and no estimator.
@@ -33,7 +33,7 @@ pub enum Answerer {
     ZeroMq,
 }
 
-/// A program that reads what a controller and the daemon write.
+/// A program that reads the channels of a controller and of the daemon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Companion {
     /// `dynocar record`.
@@ -63,10 +63,10 @@ impl Companion {
     }
 }
 
-/// Who answers, and what is beside it.
+/// The answering side, and the programs and candidates beside it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
-    /// Who answers.
+    /// The answering side.
     pub answerer: Answerer,
     /// Idle strategy of the answering threads.
     pub idle: IdleStrategy,
@@ -88,7 +88,7 @@ pub struct Extent {
     pub warm_up_s: f64,
     /// How long is measured, in s.
     pub seconds: f64,
-    /// Where the controllers and what answers run.
+    /// Cores of the controllers and of the answering side.
     pub cores: Cores,
     /// Seed of jitter and bad samples.
     pub seed: u64,

@@ -1,4 +1,4 @@
-//! The controller's end of each transport, and the listener of the plain one, which Dynocar's own waking is compared with.
+//! The controller's end of each transport, and a plain listener, with which Dynocar's own waking is compared.
 
 use std::path::Path;
 

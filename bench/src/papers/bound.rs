@@ -1,10 +1,9 @@
 //! Posterior Cramér–Rao bound of a braking coefficient.
 //!
-//! For a linear model with Gaussian noise the recursion of Tichavský, Muravchik and Nehorai
-//! (1998) is the Riccati recursion of the covariance, run here along the noise-free braking and
-//! independently of the filters that it judges. The process noise of the scenario is uniform; a
-//! Gaussian of the same variance carries the least information, so that a filter that used the
-//! uniform shape could in principle fall below.
+//! For a linear model with Gaussian noise the recursion of Tichavský, Muravchik and Nehorai (1998) is the Riccati
+//! recursion of the covariance, run here along the noise-free braking and independently of the filters that it judges.
+//! The process noise of the scenario is uniform; a Gaussian of the same variance carries the least information, so that
+//! the error of a filter that used the uniform shape could in principle fall below the bound.
 
 use nalgebra::{Matrix4, RowVector4, Vector4};
 

@@ -211,7 +211,7 @@ impl Braking {
     }
 }
 
-/// Returns the declared value of the quantity looked for; of adhesion, what the declared brake would need.
+/// Returns the declared value of the coefficient; of adhesion, the value that the declared brake force needs.
 pub fn declared(sought: BrakingCoefficient) -> f64 {
     let train = train();
     let gear = DeclaredGear::from_gear(&train.brake_gear).expect("a declared gear");

@@ -178,7 +178,7 @@ fn braking_settings() -> BrakingSettings {
         uses_speed: false,
         first_speed_std_mps: SPEED_NOISE_MPS / 3.0_f64.sqrt(),
         relative_std_max: 1e6,
-        // The papers' brakes exert what they report.
+        // The papers' brakes exert the force that they report.
         demand_relative_std: 0.03,
         ..BrakingSettings::default()
     }
@@ -191,7 +191,7 @@ fn reports(sought: BrakingCoefficient) -> BrakeFactor {
     }
 }
 
-/// Returns the settings of a kind for adhesion, or of its like for what brakes are made of.
+/// Returns the settings of the kind for adhesion, or of the similar kind for friction and braking ratio.
 fn of_kind<S>(
     sought: BrakingCoefficient,
     settings: S,
@@ -249,7 +249,7 @@ pub fn presumed(sought: BrakingCoefficient) -> ShareStep {
     SmootherSettings::default().walk(sought).into()
 }
 
-/// Returns a braking whose coefficient is drawn from what the smoother presumes.
+/// Returns a braking whose coefficient is drawn from the smoother's prior.
 pub fn drawn_braking(sought: BrakingCoefficient) -> Braking {
     let drawn = Some(presumed(sought));
     Braking { sought, drawn, from_kmh: 300.0, to_kmh: 180.0, scored_from_kmh: 265.0 }

@@ -11,17 +11,17 @@ use super::braking_score::{
 };
 use super::row::{PaperRow, Seeds};
 
-/// One of the papers' tables, and what is measured for it.
+/// One of the papers' tables, and the measurement that belongs to it.
 pub struct Table {
     /// Short name of the paper.
     pub paper: &'static str,
-    /// Its table.
+    /// Number of the table.
     pub table: &'static str,
     /// Name of the estimated coefficient, in words.
     pub name: &'static str,
     /// The braking.
     pub braking: Braking,
-    /// Initial values that the paper tries; run number k starts from the k-th, in turn.
+    /// Initial values that the paper tries; the runs take them in turn.
     pub initials: &'static [f64],
     /// The paper's mean relative error in %.
     pub published_percent: f64,

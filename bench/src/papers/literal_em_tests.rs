@@ -1,4 +1,4 @@
-//! The printed M-step with the uniform process noise itself, to show why it cannot work.
+//! The M-step as printed, with the uniform process noise: the tests show why it cannot work.
 //!
 //! ln p(x_{t+1} | x_t) of Xie 2019, eq. (22) and (31), is constant where the noise that a pair of
 //! particles implies lies within its bounds, and minus infinity elsewhere. Q is therefore

@@ -1,8 +1,8 @@
-//! Liu 2018: Davis coefficients from coasting by least squares in all its recursions.
+//! Liu 2018: Davis coefficients from coasting by every recursive form of least squares.
 //!
-//! The paper's data are not published; its figures stand next to ours on the scenario of
-//! [`scenario`]. Errors are those of w0 over 40 to 72 km/h, where the runs coast, since a, b and
-//! c are hardly distinguishable there.
+//! The paper's data are not published; its figures stand next to ours for the runs of [`scenario`]. Errors are those of
+//! w0 over 40 to 72 km/h, where the runs coast, since a, b and c are hardly distinguishable from each other in this
+//! range.
 
 pub mod methods;
 pub mod scenario;

@@ -28,7 +28,7 @@ use row::{PaperRow, Seeds};
 
 /// Every table of the five papers over seeded runs: the paper's figure, its method, ours, the bound.
 ///
-/// Exit status 1 when a row breaks what is promised of it.
+/// Exit status 1 when a row breaks one of its promises.
 #[derive(Debug, Args)]
 pub struct PapersArguments {
     /// Few seeds: a check that everything runs, not a measurement

@@ -15,7 +15,7 @@ enum Limit {
     AtLeast(f64),
 }
 
-/// Paper, part of the table's name, part of the quantity, limit; all that match hold.
+/// Paper, part of the table's name, part of the quantity, limit; a row obeys all limits that match it.
 const LIMITS: &[(&str, &str, &str, Limit)] = &[
     ("Xia 2023", "Table 3", "random starts that converge", Limit::AtLeast(100.0)),
     ("Xia 2023", "Table 3", "without noise", Limit::AtMost(1e-9)),
@@ -61,7 +61,7 @@ const SEEDS_MIN: usize = 100;
 /// Probability with which a consistent estimator's mean NEES lies in its band.
 const BAND_PROBABILITY: f64 = 0.99;
 
-/// The measurement of a row against what is promised of it.
+/// The measurement of a row against its promises.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PromiseVerdict {
     /// The 99 % chi-square band of the mean NEES per degree of freedom.

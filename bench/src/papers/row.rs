@@ -1,4 +1,4 @@
-//! One line of the comparison, and which runs are behind it.
+//! One line of the comparison, and the runs behind it.
 
 use std::ops::Range;
 

@@ -15,8 +15,8 @@ use super::row::{PaperRow, Seeds};
 
 /// Returns every row of the paper over a number of seeded runs.
 ///
-/// Rows that take a whole crossing at once, or that hardly scatter, take 20 runs at most;
-/// each row says how many.
+/// A row whose runs are whole crossings, or whose results hardly scatter, has 20 runs at most; each row states its
+/// number.
 pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     let mut rows = resistance_rows::rows(seeds);
     rows.extend(mass_rows::rows(seeds));

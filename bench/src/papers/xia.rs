@@ -1,6 +1,6 @@
 //! Xia 2023: Davis coefficients by trajectory fit.
 //!
-//! - [`scenario`]: line, driver and truth, seeded, and the Cramér-Rao bound
+//! - [`scenario`]: line, driver and true values from a seed, and the Cramér-Rao bound
 //! - [`offline`]: Table 3 (without noise) and Figure 4 (with noise)
 //! - [`online`]: Table 4 (coefficients that switch on the way)
 
@@ -12,8 +12,8 @@ use super::row::{PaperRow, Seeds};
 
 /// Returns every line of the comparison for this paper.
 ///
-/// `seeds` runs each; where the paper's method goes over a whole line of 120 km window by window
-/// it gets a tenth of them, as the line says.
+/// Each line has `seeds` runs; where the paper's method goes over a whole line of 120 km window by window it gets a
+/// tenth of them, as the row states.
 pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     let mut rows = offline::convergence_rows(seeds);
     rows.extend(offline::noise_free_rows(seeds));

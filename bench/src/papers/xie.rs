@@ -76,7 +76,7 @@ fn printed_forms(table: &Table, seeds: Seeds) -> Vec<PaperRow> {
     ]
 }
 
-/// A stop of the paper: first and last speed in km/h, what the rail carries in words and numbers, and the published
+/// A stop of the paper: first and last speed in km/h, the adhesion of the rail in words and numbers, and the published
 /// metres and seconds.
 struct PublishedStop {
     speeds_kmh: [f64; 2],

@@ -6,12 +6,12 @@ use clap::Args;
 use dynocar::output::report_line;
 use dynocar::runtime::system::{pin_to_core, set_fifo_priority};
 
-/// The two cores of a measurement, and the priority of what runs there.
+/// The two cores of a measurement, and the priority of the threads on them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cores {
-    /// Where the controller publishes and polls.
+    /// Core on which the controller publishes and polls.
     pub controller: usize,
-    /// Where the answering thread runs.
+    /// Core of the answering thread.
     pub server: usize,
     /// Real-time priority on both; ordinary when absent.
     pub priority: Option<u8>,
@@ -23,10 +23,10 @@ pub struct CoreArguments {
     /// Core of the controller, or of the publishers
     #[arg(long, value_name = "CORE")]
     controller_core: Option<usize>,
-    /// Core of the daemon's thread, and of whatever else answers
+    /// Core of the daemon's thread, or of the other answering side
     #[arg(long, value_name = "CORE")]
     daemon_core: Option<usize>,
-    /// Real-time priority (SCHED_FIFO) of the controller and of whatever answers, 1 to 99
+    /// Real-time priority (SCHED_FIFO) of the controller and of the answering side, 1 to 99
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=99))]
     priority: Option<u8>,
     /// Seed of everything drawn

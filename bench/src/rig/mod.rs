@@ -1,8 +1,8 @@
-//! Tools that measurements of processes need: a place of their own, cores, pipelines, histograms.
+//! Tools for measurements of processes: separate run-time directories, cores, pipelines, histograms.
 //!
-//! - [`site`]: a run-time directory with a daemon, gone afterwards
+//! - [`site`]: a run-time directory with a daemon, removed afterwards
 //! - [`cores`]: cores and priorities
-//! - [`pipelines`]: which pipelines a measurement names
+//! - [`pipelines`]: the pipelines that a measurement names
 //! - [`quantiles`]: histograms and their reported quantiles
 //! - [`usage`]: the kernel's counters of a process: processor time, memory, waits
 

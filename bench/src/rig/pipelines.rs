@@ -29,7 +29,7 @@ pub fn default_pipeline(
     Pipeline::new(id, 0, Arc::clone(train), track, estimator)
 }
 
-/// From samples of a train to what its estimators take in; `None` for one that is refused.
+/// Returns a function from samples of a train to the inputs of its estimators; `None` for a refused sample.
 pub fn resolving(
     id: TrainId,
     train: &Arc<TrainModel>,

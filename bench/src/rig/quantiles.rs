@@ -16,7 +16,7 @@ pub fn histogram() -> Histogram<u64> {
     Histogram::new_with_bounds(1, LONGEST_NS, 3).expect("constant bounds")
 }
 
-/// Adds a latency; one below 1 ns or above a minute counts as that.
+/// Adds a latency, limited to the range from 1 ns to a minute.
 pub fn record(histogram: &mut Histogram<u64>, latency_ns: i64) {
     histogram.saturating_record(latency_ns.clamp(1, LONGEST_NS as i64) as u64);
 }

@@ -11,8 +11,7 @@ use rustix::process::Signal;
 
 use crate::output::{BenchError, during};
 
-/// The train that latency and load drive; its brake gear is declared, so that every pipeline
-/// has what it needs.
+/// The train that latency and load drive; its brake gear is declared, so that every pipeline has its inputs.
 const TRAIN: &str = r#"[train]
 name = "measured train"
 mass_t = 200.0
@@ -115,7 +114,7 @@ pub fn peer(site: &DaemonSite, kind: &str, arguments: &[&str]) -> Result<Process
 ///
 /// # Errors
 ///
-/// When it has, with what it said.
+/// When it has ended, with its error output.
 pub fn require(process: &mut Process) -> Result<(), BenchError> {
     match process.try_wait() {
         None => Ok(()),

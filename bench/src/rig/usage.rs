@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// Counters of the kernel so far.
+/// Values of the kernel's counters so far.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ProcessUsage {
     /// Processor time of all living threads of the process, in s.
@@ -11,11 +11,11 @@ pub struct ProcessUsage {
     pub rss_bytes: u64,
     /// For how long, in s, the calling thread and the named one were ready but had no processor.
     pub waits_s: [f64; 2],
-    /// How often the named thread was made to wait for another.
+    /// How often the kernel preempted the named thread.
     pub preempted: u64,
 }
 
-/// Returns the usage of a process, of which one thread is named; zeros where it, or such a thread, is not there.
+/// Returns the usage of a process, of which one thread is named; zeros where the process or the thread does not exist.
 pub fn of(process_id: u32, thread: &str) -> ProcessUsage {
     let folder = format!("/proc/{process_id}");
     let tasks = std::fs::read_dir(format!("{folder}/task")).into_iter().flatten().flatten();

@@ -1,9 +1,9 @@
-//! The joint Cramér–Rao bound of resistance and mass over a drive: no estimator knows both better.
+//! The joint Cramér–Rao bound of resistance and mass over a drive: no estimator can be more accurate.
 //!
-//! All that [`World::draw`] draws is unknown at once, each with the variance that it is drawn with:
-//! a, b, c, the loads, the scales and the delay of forces, brakes from stop to stop, wheels, rotating
-//! mass, the wind of the day, and gusts and the map's error at every knot. What measured speeds say of them follows
-//! from how the true motion would differ.
+//! All values that [`World::draw`] draws are unknown at once, each with the variance of its draw: a, b, c, the loads,
+//! the scales and the delay of forces, brakes from stop to stop, wheels, rotating mass, the wind of the day, and gusts
+//! and the map's error at every knot. The information of measured speeds follows from the change of the true motion
+//! with each unknown.
 
 use std::collections::HashMap;
 
@@ -73,7 +73,7 @@ impl Unknown {
 const BLOCK_S: f64 = 0.5;
 /// Distance in m between the places under the train at which the map is averaged.
 const UNDER_TRAIN_M: f64 = 50.0;
-/// Variance that stands for what is known exactly.
+/// Variance that stands for an exactly known value.
 const EXACT: f64 = 1e-18;
 /// Standard deviation of a load that is drawn evenly from 24 % of the declared mass.
 const DRAWN_LOAD_STD: f64 = 0.24 / 3.464;
@@ -89,7 +89,7 @@ pub struct Bound {
     /// Variance beforehand, by place.
     prior: Vec<f64>,
     information: DMatrix<f64>,
-    /// Change of the speed by what the run under way has met, and the places of that.
+    /// Change of the speed with each unknown of the present run, and the places of these unknowns.
     sensitivity: Vec<f64>,
     met: Vec<usize>,
     is_met: Vec<bool>,
@@ -153,8 +153,8 @@ impl Bound {
         self.sensitivity[place] += change_mps;
     }
 
-    /// Loads so far. Nobody knows that one stays at a stop, unless the mass is exact: a weighing that did not change may
-    /// be off by as much as any other.
+    /// Returns the number of loads so far. Unless the mass is exact, each stop counts as a new load: an unchanged
+    /// weighing may be as wrong as any other.
     fn loads(&self, world: &World) -> usize {
         if world.scenario.load == LoadSource::Exact { 0 } else { self.stops }
     }
@@ -212,7 +212,7 @@ impl Bound {
 
     fn measure(&mut self, world: &World, speed_mps: f64, count: f64) {
         let weight = count / world.scenario.speed_noise_mps.powi(2);
-        // A wheel off by a share is off by as much of the speed, whatever was before.
+        // An error of the wheel diameter changes the measured speed in proportion, without memory of the motion before.
         let wheel = self.place(world, Unknown::Wheel);
         self.sensitivity[wheel] = speed_mps;
         for &i in &self.met {

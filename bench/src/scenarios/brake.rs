@@ -1,5 +1,5 @@
-//! Brakes as trains have them: electric above a speed, friction below, which follows its report late and
-//! exerts more or less than it says.
+//! Brakes of real trains: electric above a speed, friction below. The friction force follows its report late and is
+//! larger or smaller than reported.
 
 use std::ops::Range;
 

@@ -5,9 +5,9 @@
 //! - [`brake`]: brakes that do not act as they report
 //! - [`scenario_train`]: driving from stop to stop, and the controller's samples
 //! - [`recorded`]: the same as a dataset
-//! - [`bound`]: how well both can be known at best
+//! - [`bound`]: the least possible standard deviations of both
 //! - [`score`]: scores of answers over a drive
-//! - [`table`]: the scenarios, all of it in numbers
+//! - [`table`]: the scenarios, and their results in numbers
 
 pub mod bound;
 pub mod brake;

@@ -24,7 +24,7 @@ enum Phase {
 /// A moment of the drive: the written values, and the truth.
 #[derive(Clone, Copy, Debug)]
 pub struct DriveMoment {
-    /// As the controller wrote it.
+    /// The sample of the controller.
     pub sample: TrainSample,
     /// Mass in kg.
     pub mass_kg: f64,
@@ -60,12 +60,12 @@ pub struct ScenarioTrain {
     /// As demanded, before the limit of jerk.
     demanded_mps2: f64,
     friction: Friction,
-    /// As reported, and what is reported and acts later.
+    /// The reported acceleration, and the reported values that do not act yet.
     reported_mps2: f64,
     on_its_way: VecDeque<f64>,
     /// Step within a cycle at which a command acts.
     acts_at: u32,
-    /// Exerted brake force over what the brake is taken to exert, on this leg.
+    /// Exerted brake force over the assumed one, on this leg.
     brake_scale: f64,
     /// Gusts in m/s at the knots before and behind.
     gusts_mps: [f64; 2],

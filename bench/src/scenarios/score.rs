@@ -7,12 +7,12 @@ use crate::statistics::median;
 
 /// Speed in m/s from which an answer counts.
 pub const COUNTS_MPS: f64 = 2.0;
-/// Deviations beyond which an answer is wrong.
+/// Number of standard deviations beyond which an answer is wrong.
 const WRONG: f64 = 4.0;
-/// Share of the truth by which a worse answer than the declared one is worse.
+/// Share of the truth by which an answer's error must exceed the declaration's before the answer counts as worse.
 const WORSE_BY: f64 = 0.01;
 
-/// A usable answer: its error, its standard deviation, and the error of the declaration, over the truth.
+/// A usable answer: its error, its standard deviation, and the error of the declared value, each over the truth.
 #[derive(Clone, Copy, Debug)]
 pub struct Answer {
     /// Error over the truth.
@@ -59,7 +59,7 @@ pub struct QuantityScore {
     pub error_square: f64,
     /// The same of their deviations.
     pub deviation_square: f64,
-    /// The same of what is declared then.
+    /// The same of the declared values at these moments.
     pub declared_square: f64,
     /// Sum of squares of errors where they are compared with the least deviations.
     pub compared_square: f64,

@@ -1,4 +1,4 @@
-//! Scenarios times pipelines, in numbers.
+//! Results of every scenario and pipeline, in numbers.
 
 use std::sync::Arc;
 
@@ -17,13 +17,13 @@ use crate::ending::until_due;
 use crate::output::Record;
 use crate::parallel;
 
-/// Time in s from which errors are compared with the bound, and how much later each next time.
+/// Time in s of the first comparison of errors with the bound, and the factor from each time to the next.
 const COMPARED_FIRST_S: f64 = 60.0;
 const COMPARED_GROWTH: f64 = 1.35;
 /// Quantities that are asked for.
 const QUANTITIES: [Quantity; 2] = [Quantity::Resistance, Quantity::Mass];
 
-/// A scenario with the names of its traffic and of what is particular.
+/// A scenario with the names of its traffic and of its deviation.
 pub type NamedScenario = ([String; 2], Scenario);
 
 const TRAFFIC: [(&str, Traffic); 4] = [
@@ -33,7 +33,7 @@ const TRAFFIC: [(&str, Traffic); 4] = [
     ("high speed", Traffic::HighSpeed),
 ];
 
-/// Usual rows: for each traffic each load, and the ordinary one with everything else varied.
+/// Usual rows: for each traffic each load, and the ordinary load with each other property varied.
 pub fn scenarios() -> Vec<NamedScenario> {
     let of = |(name, traffic): (String, _)| {
         varied(traffic).map(|(what, scenario)| ([name.clone(), what.into()], scenario))

@@ -34,8 +34,8 @@ pub enum LoadSource {
     Unknown,
     /// The load changes at every stop; samples carry it, each time weighed anew with 3 %.
     Changing,
-    /// Samples carry no mass; tare and full load are declared, and a third of what there is room for changes
-    /// while the train stands.
+    /// Samples carry no mass; tare and full load are declared, and a third of the possible load changes while the train
+    /// stands.
     Passengers,
 }
 
@@ -129,7 +129,7 @@ pub const WEIGHING_STD: f64 = 0.03;
 pub const KNOT_M: f64 = 200.0;
 /// Time in s between the knots of the gusts.
 pub const GUST_S: f64 = 20.0;
-/// Standard deviation at knots of what straight lines between them carry on with that of 1.
+/// Standard deviation at the knots of straight lines whose standard deviation along the line is 1.
 pub const KNOT_OVER_MEAN: f64 = 1.22;
 
 /// Returns the standard deviation in ‰ of the map's error at a knot where it is that much on the average: straight
@@ -142,7 +142,7 @@ pub fn knot_std_permille(map_std_permille: f64) -> f64 {
 pub struct World {
     /// The scenario.
     pub scenario: Scenario,
-    /// By what all was drawn.
+    /// Sizes of the mistakes behind the draw.
     pub mistakes: Mistakes,
     /// As declared.
     pub declared: TrainModel,
@@ -150,7 +150,7 @@ pub struct World {
     pub truth: TrainModel,
     /// Traction and brake force as reported over the true ones.
     pub force_scale: [f64; 2],
-    /// Exerted brake force over what the brake is taken to exert.
+    /// Exerted brake force over the assumed one.
     pub brake_scale: f64,
     /// Wind of the day in m/s along the growing chainage.
     pub wind_mps: f64,

@@ -1,5 +1,5 @@
-//! The commands of `dynocar-bench`: documented measurements exist, Ctrl-C keeps the results so far, and output that cannot
-//! be written is reported.
+//! The commands of `dynocar-bench`: documented measurements exist, Ctrl-C keeps the results so far, and a failure to
+//! write output is reported.
 
 use std::fs;
 use std::process::{Command, Stdio};

@@ -1,10 +1,10 @@
-//! The driver over a real daemon, with few stops: nothing that decides is a time.
+//! The driver over a real daemon, with few stops; no test depends on elapsed time.
 
 use std::process::Command;
 
 use serde_json::Value;
 
-/// The answer of `dynocar-bench drive`; with so few stops chance may call something worse.
+/// The answer of `dynocar-bench drive`; with so few stops a result may be worse by chance.
 fn drive(arguments: &[&str]) -> Value {
     let few = ["drive", "--trains", "2", "--stops", "4", "--cycle-ms", "200", "--json", "-"];
     let program =

@@ -1,4 +1,4 @@
-//! `explain` of a tram whose brake does not act as it reports, from a drive as `scenarios --write` writes it.
+//! `explain` on the recording of a tram whose brake does not act as it reports, as `scenarios --write` writes it.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -25,7 +25,7 @@ fn dataset(folder: &Path) -> Dataset {
     Dataset::load(&texts[..]).unwrap()
 }
 
-/// Returns the words on a row of brakes, of a tram whose samples carry its mass.
+/// Returns the answer for a row of the brake scenarios, for a tram whose samples carry its mass.
 fn answer(row: &str) -> ExplainAnswer {
     let mut rows = table::brakes();
     rows.retain(|(names, _)| names.join(", ") == row);

@@ -1,4 +1,5 @@
-//! The measurements run, take what the documents name, and give the right answer; no time decides.
+//! The measurements run, take the arguments that the documents name, and give the right answer; no test depends on
+//! elapsed time.
 
 mod commands;
 mod drive;

@@ -1,4 +1,4 @@
-//! Ordinary driving with ordinary mistakes: what may be used is right, and changes seldom.
+//! Ordinary driving with ordinary mistakes: usable answers are right, and usability changes seldom.
 
 use std::sync::Arc;
 

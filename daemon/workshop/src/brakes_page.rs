@@ -13,7 +13,7 @@ use crate::report::provenance::Provenance;
 
 /// Width and height of the picture.
 const SIZE: (f64, f64) = (980.0, 380.0);
-/// Room in it for numbers at the left and below.
+/// Margin for the numbers at the left of the picture and below it.
 const MARGIN: f64 = 50.0;
 
 /// Reported results.
@@ -21,7 +21,7 @@ const MARGIN: f64 = 50.0;
 pub struct BrakesAnswer {
     /// Names of the datasets.
     pub datasets: Vec<String>,
-    /// How many stops the parameters are from, of how many.
+    /// Number of stops that the parameters rest on, and number of all stops.
     pub stops: [usize; 2],
     /// The law of the stops by all of the brake.
     pub law: DecelerationLaw,
@@ -33,7 +33,7 @@ pub struct BrakesAnswer {
     pub rests_on: Vec<Basis>,
     /// The level of Kdry_rst in the file.
     pub ebcl: Option<u32>,
-    /// Statements about them and their limits.
+    /// Statements about the parameters and their limits.
     pub said: Vec<String>,
 }
 
@@ -48,7 +48,7 @@ pub const K_DRY: TableColumns<Correction> = &[
     ("Kdry_rst", |it| share(it.k_dry())),
 ];
 
-/// Columns of what values rest on.
+/// Columns of the table of the sources of values.
 const RESTS_ON: TableColumns<Basis> = &[
     ("value", |it| it.key.into()),
     ("", |it| if it.is_guess { "a guess" } else { "" }.into()),
@@ -74,7 +74,7 @@ fn as_html<T>(
     table(caption, &columns, rows)
 }
 
-/// Returns the page: decelerations over speed, steps, corrections, and what they are not.
+/// Returns the page: decelerations over speed, steps, corrections, and their limits.
 pub fn html(answer: &BrakesAnswer, made: &Provenance) -> String {
     let name = escape(&answer.datasets.join(", "));
     let header = format!(

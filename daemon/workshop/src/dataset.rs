@@ -1,4 +1,4 @@
-//! The dataset at a path, be it a folder or a recording, which is one in memory.
+//! The dataset at a path: a folder, or a recording, which becomes a dataset in memory.
 
 use std::borrow::Cow;
 use std::path::{Component, Path, PathBuf};
@@ -22,7 +22,7 @@ pub fn is_recording(path: &Path) -> bool {
     is_mcap || is_parquet_path(path) && path.exists()
 }
 
-/// Reads the samples of a recording, and what is attached.
+/// Reads the samples and the attached files of a recording.
 fn samples_of(path: &Path) -> Result<Recording, String> {
     if is_parquet_path(path) {
         let content = reading::read(path).map_err(|error| error.to_string())?;
@@ -45,7 +45,7 @@ impl FilesOfDataset {
     ///
     /// # Errors
     ///
-    /// When there is nothing, or what is no dataset.
+    /// When there is nothing at the path, or no dataset.
     pub fn at<'p>(source: impl Into<DatasetSource<'p>>) -> Result<Self, LoadError> {
         let source = source.into();
         if !is_recording(source.path) {
@@ -119,7 +119,7 @@ impl DatasetFiles for FilesOfDataset {
     }
 }
 
-/// Reads what a dataset declares, but no run.
+/// Reads the declarations of a dataset, but no run.
 ///
 /// # Errors
 ///

@@ -17,10 +17,10 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 /// The library that is inside an FMU, as cargo names it.
 pub const LIBRARY: &str = "libdynocar_fmu.so";
 
-/// Why there is no FMU.
+/// Error of writing an FMU.
 #[derive(Debug, thiserror::Error)]
 pub enum FmuError {
-    /// The library was not built, or lies elsewhere.
+    /// The library was not built, or lies in another folder.
     #[error(
         "no {LIBRARY} of this release in {}: build it with `cargo build --release -p dynocar-fmu`, \
          or say with --library where it is",

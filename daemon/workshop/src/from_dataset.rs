@@ -1,4 +1,4 @@
-//! A dataset to a recording.
+//! Conversion of a dataset to a recording.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -22,10 +22,10 @@ use tempfile::TempDir;
 use super::convert::{RowError, from_rows, is_rows};
 use super::dataset::open;
 
-/// Between two runs of a dataset, for nobody knows the time that passed, in ns.
+/// Time in ns between two runs of a dataset in the recording, since the true time is not known.
 const BETWEEN_RUNS_NS: i64 = 1_000_000_000;
 
-/// Why a dataset becomes no recording.
+/// Error of a dataset that cannot become a recording.
 #[derive(Debug, thiserror::Error)]
 pub enum FromDatasetError {
     /// It cannot be read.

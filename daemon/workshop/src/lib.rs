@@ -1,7 +1,7 @@
-//! The workshop: work on recorded runs and files, away from the controller.
+//! The workshop: work on recorded runs and files, apart from the controller.
 //!
-//! It reads and writes through the daemon's library, so that both understand a file alike; the daemon
-//! knows nothing of it but its program's name.
+//! It reads and writes through the daemon's library, so that both understand a file alike; the daemon knows only the
+//! name of the workshop's program.
 //!
 //! # Layout
 //!

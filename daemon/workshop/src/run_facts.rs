@@ -7,8 +7,8 @@ use dynocar_analysis::dataset::{
 };
 use dynocar_core::plausibility::Severity;
 
-/// Returns a run's mass in t: the declared one, or the mean of what its samples carry, with the range where they
-/// carry several.
+/// Returns a run's mass in t: the declared one, or the mean of the masses in its samples, with their range where they
+/// differ.
 pub fn mass_t(run: &Run) -> String {
     let Some(spread) = run.quality.mass_kg else { return tonnes(run.mass_kg) };
     let [mean, low, high] = [spread.mean, spread.low, spread.high].map(tonnes);
@@ -21,7 +21,7 @@ pub fn tonnes(mass_kg: f64) -> String {
     format!("{:.decimals$}", mass_kg / 1000.0)
 }
 
-/// When a run was recorded, where that is known.
+/// Returns the time at which a run was recorded, where it is known.
 pub fn recorded(run: &Run) -> Option<UtcSecond> {
     let unix_s = run.recorded_unix_s?.try_into().ok()?;
     Some(UtcSecond { unix_s })

@@ -1,11 +1,10 @@
-//! The updated model as files: a train and a line that the daemon loads, and a dataset of both and of
-//! the declared runs.
+//! The updated model as files: a train and a line that the daemon loads, and a dataset of the two and of the declared
+//! runs.
 //!
-//! The declared files are taken as they are, with every key that somebody wrote into them, and
-//! only what the data changed is replaced: a, b, c always, and what holds an effect that was found:
-//! a constant, a profile, a correction. A line's file is made where none was declared and an effect
-//! needs one. What belongs to certain runs is an event and no property of a train or a line: it is
-//! listed, so that nobody takes the files for more than they are.
+//! The declared files are copied with all of their keys, and only values that the data changed are replaced: always a,
+//! b, c, and the keys of the effects that were found: a constant, a profile, a correction. A line's file is made where
+//! none was declared and an effect needs one. An effect of certain runs is an event and not a property of a train or a
+//! line: it is listed, so that nobody expects it in the files.
 
 use std::path::{Path, PathBuf};
 
@@ -90,8 +89,8 @@ pub struct UpdatedTexts {
     pub not_expressed: Vec<String>,
 }
 
-/// Returns the texts of a model that grew from declared ones of a train and a line; `labels` and `source` say in
-/// their first lines what they grew from.
+/// Returns the texts of a model that grew from declared ones of a train and a line; `labels` and `source` name these in
+/// the first lines.
 ///
 /// # Errors
 ///

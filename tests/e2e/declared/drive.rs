@@ -1,4 +1,4 @@
-//! A drive whose every force is known, as samples that declare none of them beyond the gradient.
+//! A drive whose forces are all known, as samples that declare none of them but the gradient.
 
 use dynocar_model::track::Track;
 use dynocar_model::train::{Davis, TrainModel};
@@ -20,9 +20,9 @@ pub const SPEED_DELAY_S: f64 = 0.8;
 const NOISE_MPS: f64 = 0.01;
 /// Steps of integration between two samples.
 const SUBSTEPS: u32 = 20;
-/// Time in s between the starts of the two runs: bearings are cold again whatever the rule.
+/// Time in s between the starts of the two runs: long enough for cold bearings under any rule.
 const RUN_EVERY_S: f64 = 20_000.0;
-/// Commanded force over weight, positive for traction, and for how long in s.
+/// Commanded force over weight, positive for traction, and its duration in s.
 const LEG: [(f64, f64); 6] =
     [(0.0, 10.0), (0.075, 35.0), (0.0, 60.0), (0.05, 18.0), (0.0, 50.0), (-0.09, 40.0)];
 /// Legs of each of the two runs.

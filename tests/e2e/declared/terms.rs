@@ -1,4 +1,4 @@
-//! Every term that can be declared, with the law that the test holds against the resolver's.
+//! Every term that can be declared, with the law that the test compares with the resolver's.
 
 use dynocar_analysis::dataset::{parse_track, parse_train};
 use dynocar_model::track::Track;
@@ -8,7 +8,7 @@ use dynocar_shared::{SampleField, TrainSample};
 
 use super::drive::{DELAY_S, Drive, Instant, LAG_S, SPEED_DELAY_S};
 
-/// A train that declares nothing but what is true of it in any case.
+/// A train that declares only its true figures, without any of these terms.
 pub const TRAIN: &str = "
 [train]
 mass_t = 90
@@ -124,8 +124,8 @@ const fn correction(line: &'static str) -> (&'static str, &'static str) {
     ("[corrections]\n", line)
 }
 
-/// How a kind of effect is declared once it is known; empty for what belongs to certain runs and
-/// is no property of a train or a line.
+/// Returns the declarations of a known kind of effect; empty for an effect that belongs to certain runs and is not a
+/// property of a train or a line.
 pub fn declarations(kind: EffectKind) -> Vec<Declaration> {
     match kind {
         EffectKind::None | EffectKind::DraggingBrake | EffectKind::LowAdhesion => Vec::new(),

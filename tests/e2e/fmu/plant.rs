@@ -1,4 +1,4 @@
-//! The train itself as an FMU: it drives as `explain` predicts, stands, starts and refuses in words.
+//! The train itself as an FMU: it drives as `explain` predicts, stands, starts, and explains its refusals.
 
 use std::fs::{read_to_string, write};
 
@@ -14,11 +14,11 @@ use super::simulator::{Fmu, reference, reference_in};
 use super::{demo, unpacked};
 use crate::commands::{done, dynocar, said};
 
-/// Corrections of a train by runs: one of every sort.
+/// Corrections of a train, one of every sort.
 const CORRECTIONS: &str = "\n[corrections]\ntraction_gain = 1.04\nambient_w0_per_k = -0.004\nbearing_delta_a_n_per_kn = 0.6\nbearing_tau_s = 400\n\
     actuator_delay_s = 0.7\nactuator_lag_s = 0.4\n";
 
-/// The inputs that a recorded sample gives.
+/// The inputs of the FMU with their fields of a recorded sample.
 const INPUTS: [(&str, SampleField); 5] = [
     ("traction_force_n", SampleField::TractionForce),
     ("brake_force_n", SampleField::BrakeForce),
@@ -63,7 +63,7 @@ fn predicted(run: &RunData, davis: [f64; 3]) -> Vec<f64> {
     prediction.speed_mps().to_vec()
 }
 
-/// Sets what a sample gives, and its slopes towards the next.
+/// Sets the inputs from a sample, and their slopes towards the next one.
 fn act(fmu: &Fmu, sample: &TrainSample, next: &TrainSample) {
     let step_s = (next.time_ns - sample.time_ns) as f64 * 1e-9;
     for (name, field) in INPUTS {

@@ -1,4 +1,4 @@
-//! A simulator as an FMU meets it: it calls the standard's functions, and hears what the FMU says.
+//! A simulator as an FMU meets it: it calls the standard's functions, and keeps the FMU's messages.
 
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_int, c_void};
@@ -21,7 +21,7 @@ type Said = RefCell<Vec<String>>;
 /// A logger for formats that ask for no argument.
 type PlainLogger = unsafe extern "C" fn(*mut c_void, FmiString, c_int, FmiString, FmiString);
 
-/// Takes a message down; the FMU's formats ask for no argument.
+/// Stores a message; the FMU's formats ask for no argument.
 unsafe extern "C" fn take_down(
     said: *mut c_void,
     _name: FmiString,

@@ -7,7 +7,7 @@ use dynocar_tests::process::{DaemonSite, Process, Terminal, Tie};
 
 use crate::commands::{DYNOCAR, dynocar, run, said};
 
-/// Somebody whom `dynocar` asks.
+/// A user at a terminal whom `dynocar` asks.
 struct Asked {
     process: Process,
     terminal: Terminal,

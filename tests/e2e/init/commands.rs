@@ -1,4 +1,4 @@
-//! Commands as a person types them, and a recording to give them.
+//! Commands as a person types them, and a recording for them.
 
 use std::fmt::Write as _;
 use std::process::{Command, Output, Stdio};
@@ -12,14 +12,14 @@ pub fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// A command in the site's folder, with nobody at the keyboard.
+/// Runs a command in the site's folder, with empty standard input.
 pub fn dynocar(site: &DaemonSite, arguments: &[&str]) -> Output {
     let mut command = Command::new(DYNOCAR);
     command.args(arguments).current_dir(site.path()).stdin(Stdio::null());
     command.output().unwrap()
 }
 
-/// Standard output of a command that must succeed.
+/// Returns the standard output of a command that must succeed.
 pub fn done(site: &DaemonSite, arguments: &[&str]) -> String {
     let output = dynocar(site, arguments);
     assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", said(&output));

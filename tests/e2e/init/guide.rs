@@ -9,12 +9,12 @@ use crate::commands::DYNOCAR;
 
 pub const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
-/// A guide's text.
+/// Returns the text of a guide.
 pub fn guide(name: &str) -> String {
     std::fs::read_to_string(Path::new(ROOT).join("docs/guides").join(name)).expect("the guide")
 }
 
-/// The lines of a guide's code blocks in a language.
+/// Returns the lines of a guide's code blocks in a language.
 pub fn blocks<'g>(guide: &'g str, language: &str) -> Vec<&'g str> {
     let mark = format!("```{language}\n");
     let blocks = guide.split(&mark).skip(1).filter_map(|rest| rest.split("```").next());
@@ -27,7 +27,7 @@ pub fn install(site: &DaemonSite) {
     std::os::unix::fs::symlink(DYNOCAR, site.path().join("bin/dynocar")).unwrap();
 }
 
-/// Runs a line that must succeed in the site's folder; gives what it printed for people.
+/// Runs a line that must succeed in the site's folder; returns its standard error.
 pub fn run(site: &DaemonSite, line: &str) -> String {
     let path = std::env::var("PATH").unwrap_or_default();
     let output = Command::new("sh")

@@ -1,4 +1,4 @@
-//! `dynocar-live` as the tests start it.
+//! The program `dynocar-live`, built where the end-to-end tests can find it.
 
 use std::process::ExitCode;
 

@@ -1,4 +1,4 @@
-//! `dynocar-recording` as the tests start it.
+//! The program `dynocar-recording`, built where the end-to-end tests can find it.
 
 use std::process::ExitCode;
 

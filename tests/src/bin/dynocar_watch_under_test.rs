@@ -1,4 +1,4 @@
-//! `dynocar-watch` as the tests start it.
+//! The program `dynocar-watch`, built where the end-to-end tests can find it.
 
 use std::process::ExitCode;
 

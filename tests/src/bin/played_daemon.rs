@@ -1,8 +1,8 @@
-//! A daemon with one pipeline, played for controllers that are tested in other languages.
+//! An imitation of a daemon with one pipeline, for tests of controllers in other languages.
 //!
-//! `dynocar-played-daemon` prints its run-time directory, then every sample that it takes, one line of JSON
-//! each. It answers samples after the line `answer` on standard input, no more after `silence`, and ends
-//! with standard input.
+//! `dynocar-played-daemon` prints its run-time directory, then every sample that it takes as a line of JSON. It answers
+//! samples after the line `answer` on standard input, stops answering after the line `silence`, and ends at the end of
+//! standard input.
 
 use std::io::{BufRead, Write};
 use std::sync::mpsc::{TryRecvError, channel};

@@ -1,9 +1,9 @@
 //! A controller that the kernel kills at its first system call.
 //!
-//! `dynocar-sealed-peer WHAT TRAIN` connects, warms up, lets the kernel forbid every system call
-//! but writing and leaving, and then does WHAT again and again: `poll`, `cycle` (publish and poll,
-//! until there was news often enough) or `call`, which makes a system call to show that the seal
-//! holds. Who is still alive then writes how often there was news.
+//! `dynocar-sealed-peer ACTION TRAIN` connects, warms up, lets the kernel forbid every system call but those for
+//! writing and ending, and then repeats ACTION: `poll`, `cycle` (publish and poll, until enough new snapshots have
+//! come) or `call`, which makes a system call to show that the seal holds. A process that is still alive then writes
+//! the number of new snapshots.
 
 use std::time::{Duration, Instant};
 
@@ -11,8 +11,8 @@ use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use dynocar_transport::{Host, monotonic_now_ns};
 
-/// The ports connect with the first messages, and a new controller wakes every thread that it
-/// knows nothing of for half a second.
+/// Time for the ports to connect with the first messages; for half a second a new controller also wakes every thread
+/// whose state it does not know.
 const WARM_UP: Duration = Duration::from_millis(700);
 const CALLS: u64 = 20_000;
 const NEWS: u64 = 50;
@@ -82,7 +82,7 @@ fn seal() {
         k: number as u32,
     };
     let mut filter = [
-        // The system call's number is the first word of what the filter sees.
+        // The system call's number is the first word of the filter's input.
         statement(libc::BPF_LD | libc::BPF_W | libc::BPF_ABS, 0),
         skip_if(libc::SYS_write, 2),
         skip_if(libc::SYS_exit_group, 1),

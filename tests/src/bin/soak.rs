@@ -1,4 +1,4 @@
-//! Seeded faults for as long as one likes.
+//! Seeded faults for any length of time.
 
 use std::collections::BTreeMap;
 use std::process::ExitCode;
@@ -74,7 +74,7 @@ fn main() -> ExitCode {
     ExitCode::SUCCESS
 }
 
-/// Lives the months; an error says what is wrong with the request.
+/// Simulates the months; an error describes the mistake in the request.
 fn live(months: &Months) -> Result<(), String> {
     let stories = match months.story.as_deref().map(|name| (name, Story::from_name(name))) {
         None => Story::all(),

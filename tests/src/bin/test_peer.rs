@@ -1,11 +1,9 @@
 //! A controller or a client that a test may kill at any moment.
 //!
-//! `dynocar-test-peer controller TRAIN PERIOD_US` publishes for ever and prints each hundredth
-//! sequence number; `dynocar-test-peer client TRAIN PERIOD_US` polls for ever and prints one line
-//! a poll: epoch, sequence, sample sequence, used, lost, age in ms, stale, status, time of the
-//! poll and its length in ns.
-//! `dynocar-test-peer controllers COUNT PERIOD_US` publishes for trains 1 to COUNT, and prints a line when all
-//! are open.
+//! `dynocar-test-peer controller TRAIN PERIOD_US` publishes for ever and prints every hundredth sequence number;
+//! `dynocar-test-peer client TRAIN PERIOD_US` polls for ever and prints one line a poll: epoch, sequence, sample
+//! sequence, used, lost, age in ms, stale, status, time of the poll and its length in ns. `dynocar-test-peer
+//! controllers COUNT PERIOD_US` publishes for trains 1 to COUNT, and prints a line when all are open.
 //! `dynocar-test-peer state-writer FOLDER` replaces a state file for ever.
 
 use std::io::Write;

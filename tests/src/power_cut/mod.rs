@@ -1,11 +1,10 @@
 //! A disk that loses unsynced writes: every state in which a power cut may leave it.
 //!
-//! The disk is asked what [`Storage`] asks of one, and notes each step. After a cut there are, in
-//! any combination: names whose change was not brought to the disk, changed or not, each on its
-//! own; and of the bytes of a file that were not, none, half, all, or as many zeros. A renaming is
-//! whole or not at all, as on every journalling file system.
+//! The disk takes the requests of [`Storage`] and notes each step. After a cut each name whose change was not synced is
+//! changed or unchanged, in any combination; of the unsynced bytes of a file, none, half or all are there, or as many
+//! zeros. A renaming happens completely or not at all, as on every journalling file system.
 //!
-//! [`NotedDisk`] does the same beside a real folder, for whoever also reads what is there.
+//! [`NotedDisk`] does the same beside a real folder, for tests that also read the files.
 
 mod noted;
 mod steps;
@@ -21,7 +20,7 @@ pub use noted::NotedDisk;
 pub use steps::Left;
 use steps::{AfterSteps, CutStep, apply};
 
-/// Which of its duties a disk neglects, to show that the tests notice.
+/// Duty that a disk neglects, to show that the tests notice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Neglect {
     /// None.

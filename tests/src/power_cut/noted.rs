@@ -1,4 +1,4 @@
-//! A real folder, and a record of its state after a power cut.
+//! A real folder, with a record of the states in which a power cut may leave it.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -7,10 +7,10 @@ use dynocar::storage::{Disk, Rights, Storage};
 
 use super::LossyDisk;
 
-/// The file system, with all that was asked of it noted beside.
+/// The file system, with a note of each request.
 #[derive(Clone, Debug)]
 pub struct NotedDisk {
-    /// Disk after a power cut.
+    /// The disk that notes the requests.
     pub notes: LossyDisk,
 }
 

@@ -8,25 +8,25 @@ use dynocar::storage::folder_of;
 /// Contents of the disk after a cut, by name.
 pub type Left = BTreeMap<PathBuf, Vec<u8>>;
 
-/// Changes of names that are taken in any combination; older ones are taken as done.
+/// Number of the newest changes of names that are tried in any combination; older ones count as done.
 const NAMES_MAX: usize = 8;
 
-/// One thing that was asked for.
+/// One request to the disk.
 #[derive(Clone, Debug)]
 pub enum CutStep {
-    /// A new file.
+    /// Creates a file.
     Make { path: PathBuf, file: usize },
-    /// At the end of a file.
+    /// Writes at the end of a file.
     Write { file: usize, bytes: Vec<u8> },
-    /// The written bytes are durable.
+    /// Makes the written bytes of a file durable.
     SyncBytes { file: usize },
-    /// A second name.
+    /// Gives a file a second name.
     Link { to: PathBuf, file: usize },
-    /// Of a file.
+    /// Renames a file.
     Rename { from: PathBuf, to: PathBuf, file: usize },
-    /// Of a folder: all its files at once.
+    /// Renames a folder, with all its files at once.
     RenameFolder { from: PathBuf, to: PathBuf },
-    /// Of a name.
+    /// Removes a name.
     Remove { path: PathBuf },
     /// The names in a folder are there for good.
     SyncNames { folder: PathBuf },

@@ -16,7 +16,7 @@ use rustix::process::{Pid, Signal, kill_process};
 pub use site::DaemonSite;
 pub use terminal::{Terminal, Tie};
 
-/// How long a test waits for what must happen before it calls it a hang.
+/// Time that a test waits for an expected event before it reports a hang.
 pub const WATCHDOG: Duration = Duration::from_secs(30);
 
 /// A running program; killed when dropped.
@@ -178,7 +178,7 @@ impl Process {
     ///
     /// # Panics
     ///
-    /// After [`WATCHDOG`], with what it said.
+    /// After [`WATCHDOG`], with its standard error.
     pub fn await_line(&self, what: &str, condition: impl Fn(&str) -> bool) -> String {
         let mut newest = String::new();
         await_true(
@@ -195,7 +195,7 @@ impl Process {
     ///
     /// # Panics
     ///
-    /// After [`WATCHDOG`], with what it said.
+    /// After [`WATCHDOG`], with its standard error.
     pub fn await_error(&self, text: &str) {
         await_true(
             || self.errors().contains(text),
@@ -216,7 +216,7 @@ impl Drop for Process {
 ///
 /// # Panics
 ///
-/// After [`WATCHDOG`], with what was waited for.
+/// After [`WATCHDOG`], with the awaited condition.
 pub fn await_true(mut condition: impl FnMut() -> bool, what: impl Fn() -> String) {
     let start = Instant::now();
     while !condition() {

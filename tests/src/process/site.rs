@@ -1,4 +1,4 @@
-//! A place for processes that nobody else meets.
+//! A separate run-time directory for the processes of one test.
 
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
@@ -107,8 +107,7 @@ impl DaemonSite {
         self.start_command(command)
     }
 
-    /// Starts a program that may neither lock memory nor take a real-time priority, whoever runs
-    /// the test.
+    /// Starts a program that may neither lock memory nor take a real-time priority, even if root runs the test.
     ///
     /// # Panics
     ///
@@ -123,7 +122,7 @@ impl DaemonSite {
     /// Returns a program on this site that is not started yet.
     pub fn command(&self, program: &str, arguments: &[&str]) -> Command {
         let mut command = Command::new(program);
-        // A place of its own for each process: no daemon starts from what another learned unless a test says so.
+        // A place of its own for each process: no daemon starts from another one's states unless a test says so.
         let states = self.path().join(format!("states-{}", unique_number()));
         command.args(arguments).env(ROOT_VARIABLE, self.root());
         command.env("XDG_STATE_HOME", states).env_remove("STATE_DIRECTORY");
@@ -189,8 +188,8 @@ b = 0.03
 c = 0.0043
 ";
 
-/// Takes `CAP_IPC_LOCK` and `CAP_SYS_NICE` out of what a program may ever have again, and sets the
-/// limits that stand in for them to nothing.
+/// Removes `CAP_IPC_LOCK` and `CAP_SYS_NICE` from the capabilities that a program can ever gain, and sets the limits
+/// that allow the same to 0.
 fn drop_real_time_rights() -> std::io::Result<()> {
     use rustix::process::{Resource, Rlimit, setrlimit};
     use rustix::thread::{CapabilitySet, remove_capability_from_bounding_set};

@@ -17,18 +17,18 @@ use super::{Process, await_true};
 pub enum Tie {
     /// It leads the terminal's session: a closed terminal sends it SIGHUP.
     Leader,
-    /// It leads it with SIGHUP ignored, as `nohup` starts programs.
+    /// It leads the session and ignores SIGHUP, as `nohup` starts programs.
     Deaf,
-    /// It writes on a terminal that is not its own: a closed one sends it nothing.
+    /// It writes on a terminal of another session: a closed terminal sends it no signal.
     Guest,
 }
 
-/// Somebody's end of a terminal.
+/// A user's end of a terminal, and the program's.
 pub struct Terminal {
     near: File,
     far: OwnedFd,
     shown: Vec<u8>,
-    /// How much of what is shown was looked at.
+    /// Length of the shown text that was already searched.
     seen: usize,
 }
 
@@ -88,11 +88,11 @@ impl Terminal {
         }
     }
 
-    /// Waits until this is shown, after what was waited for before.
+    /// Waits until this text is shown, after the text of the previous call.
     ///
     /// # Panics
     ///
-    /// After [`super::WATCHDOG`], with what is shown.
+    /// After [`super::WATCHDOG`], with the shown text.
     pub fn see(&mut self, words: &str) {
         let (mut shown, seen) = (String::new(), self.seen);
         let mut place = None;

@@ -5,12 +5,12 @@ use std::collections::VecDeque;
 use super::driving::Controls;
 use super::train_maker::TrueTrain;
 
-/// First-order lag over one step.
+/// Returns a value after one step of a first-order lag.
 pub(super) fn lagged(value: f64, towards: f64, step_s: f64, lag_s: f64) -> f64 {
     if lag_s <= 0.0 { towards } else { towards + (value - towards) * (-step_s / lag_s).exp() }
 }
 
-/// `value` moved towards a goal by at most `change`.
+/// Returns `value` moved towards a goal by at most `change`.
 fn slewed(value: f64, goal: f64, change: f64) -> f64 {
     value + (goal - value).clamp(-change, change)
 }
@@ -26,7 +26,7 @@ pub struct Actuators {
 }
 
 impl Actuators {
-    /// Actuators of a train of this mass in kg, at rest with `held_n` of brake force.
+    /// Returns the actuators of a train of this mass in kg, at rest with `held_n` of brake force.
     pub fn new(train: &TrueTrain, mass_kg: f64, step_s: f64, held_n: f64) -> Self {
         let held = Controls { traction_force_n: 0.0, brake_force_n: held_n };
         Actuators {
@@ -38,7 +38,7 @@ impl Actuators {
         }
     }
 
-    /// Moves the forces one step towards what the driver wants.
+    /// Moves the forces one step towards the driver's wish.
     pub fn advance(&mut self, train: &TrueTrain, wanted: Controls, speed_mps: f64) -> Controls {
         let handling = &train.handling;
         let change_n = self.slew_n_per_s * self.step_s;

@@ -173,7 +173,7 @@ pub fn make_style(extra_decimals: usize, random: &mut SimulatorRandom) -> FileSt
     }
 }
 
-/// One row of a run file; what is missing is an empty cell.
+/// Returns a row of a run file; a missing value is an empty cell.
 pub fn row_text(
     sample: &TrainSample,
     style: &FileStyle,

@@ -4,7 +4,7 @@ use super::deviations::TrueDeviations;
 use super::random::{SimulatorRandom, Stream};
 use super::train_maker::rounded;
 
-/// A draw of what is off in all runs of a dataset alike.
+/// A draw of the deviations that all runs of a dataset share.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CommonDeviations {
     /// True over declared curve constant.
@@ -25,7 +25,7 @@ pub struct CommonDeviations {
     waves: Vec<[f64; 3]>,
 }
 
-/// Waves that make a map's error.
+/// Number of waves whose sum is a map's error.
 const WAVES: usize = 12;
 /// Their lengths in m.
 const WAVES_M: (f64, f64) = (1500.0, 8000.0);

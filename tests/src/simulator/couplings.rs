@@ -1,8 +1,8 @@
 //! Couplings between the cars: the leading car, which carries the tacho, does not move as the train does.
 //!
-//! Inner forces do not move the centre of mass, so the train as a whole moves as if it were rigid. What
-//! couplings add is how its first car moves against the whole: a chain of masses on springs and dampers,
-//! with slack in a freight train, under the forces that act on each car.
+//! Inner forces do not move the centre of mass, so the train as a whole moves as if it were rigid. Couplings add the
+//! motion of its first car relative to the whole: a chain of masses on springs and dampers, with slack in a freight
+//! train, under the forces that act on each car.
 
 use dynocar_model::train::TrainModel;
 

@@ -5,7 +5,7 @@ use dynocar_shared::{SampleField, TrainSample};
 use super::random::SimulatorRandom;
 use super::settings::Defects;
 
-/// Spoils the samples of one run.
+/// Applies the defects to the samples of one run.
 pub fn spoil(
     samples: Vec<TrainSample>,
     defects: &Defects,
@@ -22,7 +22,7 @@ pub fn spoil(
     swap_rows(repeated, defects.swapped_rows, random)
 }
 
-/// Takes out single rows and gaps; the first row stays.
+/// Removes single rows and longer gaps; the first row stays.
 fn remove_rows(
     samples: Vec<TrainSample>,
     defects: &Defects,

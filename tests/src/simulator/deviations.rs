@@ -1,17 +1,17 @@
 //! Deviations of everything that is declared, without an undeclared effect.
 
-/// By how much what is declared is off: standard deviations unless said otherwise.
+/// Deviations of the declared figures from the true ones: standard deviations unless stated otherwise.
 ///
 /// An undeclared effect of a kind takes the place of the deviation of the same kind.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrueDeviations {
-    /// Of the true from the declared mass, from run to run.
+    /// Deviation of the true from the declared mass, from run to run.
     pub mass_share: f64,
-    /// Of the load, anew at each stop of each run.
+    /// Deviation of the load, drawn anew at each stop of each run.
     pub load_share: f64,
     /// Of the map's gradient in ‰, smooth along the line.
     pub map_permille: f64,
-    /// Of the map's gradient in ‰, of each of its pieces for itself.
+    /// Of the map's gradient in ‰, independent for each of its pieces.
     pub survey_permille: f64,
     /// Of the curve constant.
     pub curve_constant_share: f64,
@@ -19,7 +19,7 @@ pub struct TrueDeviations {
     pub day_wind_mps: f64,
     /// Of the gusts in m/s, which last about 20 s.
     pub gust_mps: f64,
-    /// Mean time in s that forces act after their stamps, a half to one and a half of it.
+    /// Mean time in s that forces act after their stamps; drawn from a half to one and a half of it.
     pub force_late_s: f64,
     /// Of the reported traction, and of the reported brake force, in all runs alike.
     pub force_share: f64,
@@ -92,7 +92,8 @@ impl TrueDeviations {
         ..TrueDeviations::PLAIN
     };
 
-    /// The same, and what hides in many runs as it is in all of them: another rotating mass and rounded gradients.
+    /// The same, with deviations that many runs cannot reveal because all runs share them: another rotating mass and
+    /// rounded gradients.
     pub const ROUGHER: TrueDeviations =
         TrueDeviations { rotating_mass: 0.004, vertical_curve_m: 80.0, ..TrueDeviations::ROUGH };
 }

@@ -29,7 +29,7 @@ const ARRIVED_M: f64 = 8.0;
 /// Gain in 1/s from a speed error to an acceleration.
 const SPEED_GAIN_PER_S: f64 = 0.12;
 
-/// Drives one run. Knows the declared train and line, and corrects by what it sees.
+/// A driver of one run, who knows the declared train and line, and corrects by the train's motion.
 #[derive(Debug)]
 pub struct TrainDriver<'a> {
     train: &'a TrueTrain,

@@ -15,11 +15,11 @@ pub struct Controls {
 
 /// Decides on the forces.
 pub trait Driver {
-    /// Returns the forces from `time_s` on, given where the train is; `None` ends the run.
+    /// Returns the forces from `time_s` on for the motion of the train; `None` ends the run.
     fn controls(&mut self, time_s: f64, motion: SimulatedMotion) -> Option<Controls>;
 }
 
-/// A closure (time in s, motion) to the forces.
+/// A closure from time in s and motion to the forces is a driver.
 impl<F: FnMut(f64, SimulatedMotion) -> Option<Controls>> Driver for F {
     fn controls(&mut self, time_s: f64, motion: SimulatedMotion) -> Option<Controls> {
         self(time_s, motion)
@@ -47,7 +47,7 @@ impl TrainOnLine<'_> {
         self.start_m + self.direction * motion.distance_m
     }
 
-    /// dv/dt in m/s² by the declared model; what is not known of the line counts as none there.
+    /// Returns dv/dt in m/s² by the declared model; unknown properties of the line count as absent.
     ///
     /// At rest a negative value means that the train stays where it is.
     pub fn acceleration_mps2(&self, motion: SimulatedMotion, controls: Controls) -> f64 {

@@ -1,4 +1,4 @@
-//! Effects of a size that matters, at places where the train goes.
+//! Effects of a relevant size, at places where the train runs.
 
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -11,7 +11,7 @@ use super::settings::TrainType;
 use super::train_maker::{TrueTrain, rounded};
 use super::unlisted::{Law, Unlisted};
 
-/// Types of train on which an effect of this kind shows.
+/// Returns the types of train on which an effect of this kind shows.
 pub fn suitable_types(kind: EffectKind) -> &'static [TrainType] {
     use TrainType::{Freight, HighSpeed, Metro, Regional};
     match kind {

@@ -1,4 +1,4 @@
-//! Simulated GNSS receiver.
+//! A simulated GNSS receiver.
 
 use dynocar_analysis::survey::geodesy::LocalPlane;
 use dynocar_shared::TrainSample;
@@ -8,11 +8,11 @@ use super::random::SimulatorRandom;
 use super::settings::{GnssReceiver, SimulatorSettings};
 use super::true_run::{TRUE_STEP_S, TrueState};
 
-/// Where every line starts on the map.
+/// Latitude and longitude of the start of every line.
 const ORIGIN_DEG: (f64, f64) = (47.0, 9.0);
 /// Altitude in m of a line's start.
 const ORIGIN_M: f64 = 450.0;
-/// Step in m in which the alignment is laid.
+/// Step in m with which the alignment is computed.
 const STEP_M: f64 = 5.0;
 /// Error in m of an altitude, and the time constant in s with which it fades.
 const ALTITUDE_ERROR: (f64, f64) = (6.0, 60.0);

@@ -15,7 +15,7 @@ pub struct SpeedLimit {
     pub speed_mps: f64,
 }
 
-/// A line with what the track file does not hold.
+/// A line, with properties that the track file lacks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimulatedLine {
     /// The declared track.
@@ -244,7 +244,7 @@ fn make_stations(
     }
 }
 
-/// Drawn limits, lowered in curves to what their radius allows.
+/// Draws speed limits, lowered in curves to the speed that their radius allows.
 fn make_limits(
     ranges: &Ranges,
     length_m: f64,

@@ -1,18 +1,17 @@
-//! A high-fidelity simulator of recorded runs, the project's own judge of what it claims.
+//! A high-fidelity simulator of recorded runs, with which the project checks its claims.
 //!
-//! From a seed it draws a train of one of four types, a line, and runs in both directions with
-//! their load, weather and driver. The truth is a train of many cars that each feel their own
-//! gradient, curve and tunnel, under jerk-limited commands and lagging actuators. Undeclared
-//! effects act on that truth, or on the sensors where they belong; the declaration, and what the
-//! sensors recorded, is all that the program under test may see.
+//! From a seed it draws a train of one of four types, a line, and runs in both directions with their load, weather and
+//! driver. The truth is a train of many cars that each feel their own gradient, curve and tunnel, under jerk-limited
+//! commands and lagging actuators. Undeclared effects act on that truth, or on the sensors; the program under test sees
+//! only the declaration and the recordings of the sensors.
 //!
 //! # Layout
 //!
 //! - [`settings`]: the requested dataset; [`random`]: a stream of numbers per subject
 //! - [`train_maker`], [`line_maker`], [`run_maker`]: train, line and runs
 //! - [`deviations`], [`common_deviations`]: small errors of all declarations
-//! - [`effects`], [`unlisted`], [`effect_maker`], [`disturbances`]: what is undeclared, and what it
-//!   changes
+//! - [`effects`], [`unlisted`], [`effect_maker`], [`disturbances`]: undeclared effects, and their changes of forces and
+//!   sensors
 //! - [`driving`], [`permitted_speed`], [`driver`], [`actuators`], [`dynamics`], [`true_run`],
 //!   [`couplings`]: driving and motion
 //! - [`sensors`], [`defects`], [`gnss`]: the recording

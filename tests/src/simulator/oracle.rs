@@ -1,7 +1,7 @@
 //! Prediction of a dataset by the true parameters, in the terms of the effect library.
 //!
-//! The oracle sees the recorded samples only, but knows the effects. What it cannot know is noise,
-//! gusts, and what the declared form leaves out (each car's own mass, the odometer's error).
+//! The oracle sees the recorded samples only, but knows the effects. It knows neither noise nor gusts, nor details that
+//! the declared form lacks (each car's own mass, the odometer's error).
 
 use std::sync::Arc;
 
@@ -21,9 +21,9 @@ use super::{SimulatedDataset, SimulatedRun};
 /// RMSE in m/s over the pooled holdout runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OracleErrors {
-    /// Of the declared model.
+    /// Error of the declared model.
     pub declared_mps: f64,
-    /// Of the true Davis coefficients with the true effects.
+    /// Error of the true Davis coefficients with the true effects.
     pub true_mps: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The speed that limits and the next stop allow along the way.
+//! The speed that the limits and the next stop allow along a run.
 
 use super::line_maker::SimulatedLine;
 
@@ -10,7 +10,7 @@ pub struct PermittedSpeed {
     squares: Vec<f64>,
 }
 
-/// A way from one stop to the next.
+/// A leg from one stop to the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PermittedLeg {
     /// Distance travelled in m at its start.

@@ -9,7 +9,7 @@ use super::random::{SimulatorRandom, Stream};
 use super::true_run::TRUE_STEP_S;
 use super::{SimulatedDataset, SimulatedRun};
 
-/// A drive and what its recorder reports of it.
+/// A drive and the power that its recorder reports.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrueDrive {
     /// Share of the electric power that reaches the rims, and of the rims' power that comes back.

@@ -15,7 +15,7 @@ use super::true_run::{TRUE_STEP_S, TrueState};
 /// The train that the simulator's samples belong to.
 pub const SIMULATED_TRAIN: TrainId = TrainId(1);
 
-/// A sensor: noise of its own, noise in proportion to the reading, and a quantum.
+/// A sensor: constant noise, noise in proportion to the reading, and a quantum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensor {
     /// Standard deviation of the constant noise.
@@ -142,7 +142,7 @@ pub fn measure_run(
             // The stamp gives the instant truly, to a millisecond.
             let late_s = if k == 0 { 0.0 } else { jitter_s.clamp(-0.4, 0.4) };
             let time_s = ((k as f64 * period_s + late_s) * 1000.0).round() / 1000.0;
-            // A sample at a true instant reads that instant, whatever the rounding.
+            // A sample at a true instant reads exactly that instant, in spite of rounding.
             let place = (1e6 * time_s / TRUE_STEP_S).round() / 1e6;
             let index = (place as usize).min(states.len() - 2);
             let instant = Instant { states, index, share: place - index as f64 };

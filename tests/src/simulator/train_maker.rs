@@ -18,7 +18,7 @@ pub struct Car {
     pub ahead_m: f64,
 }
 
-/// How a train's drives and brakes answer.
+/// Response of a train's drives and brakes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrainHandling {
     /// Highest speed in m/s.

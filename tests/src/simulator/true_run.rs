@@ -13,7 +13,7 @@ use super::settings::{ForceSampling, SimulatorSettings};
 /// Step in s of the true motion.
 pub const TRUE_STEP_S: f64 = 0.05;
 
-/// A run is cut off here, in multiples of the length that it aims at.
+/// Greatest duration of a run, after which it is cut off, in multiples of the duration aimed at.
 const DURATION_FACTOR_MAX: f64 = 2.5;
 
 /// True values at one instant.
@@ -27,7 +27,7 @@ pub struct TrueState {
     pub distance_m: f64,
     /// Speed in m/s.
     pub speed_mps: f64,
-    /// Speed in m/s of the wheel that carries the tacho: differs while it slips.
+    /// Speed in m/s of the wheel that carries the tacho; it differs while the wheel slips.
     pub wheel_speed_mps: f64,
     /// Forces before the sensors' noise.
     pub reported: Controls,

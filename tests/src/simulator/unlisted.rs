@@ -1,4 +1,4 @@
-//! Resistances that no library holds, by laws of the simulator's own.
+//! Resistances that the library of effects lacks, by laws of the simulator's own.
 
 use super::random::SimulatorRandom;
 
@@ -13,7 +13,7 @@ pub struct Around {
     pub degc: f64,
 }
 
-/// How a resistance depends on what is around, without unit.
+/// Dependence of a resistance on its inputs ([`Around`]), without unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Law {
     /// A resonance: bell-shaped over speed.
@@ -25,9 +25,9 @@ pub enum Law {
     },
     /// As one over the speed, for slow trains.
     Slow {
-        /// The force ends here.
+        /// Limit at which the force vanishes.
         below_mps: f64,
-        /// Below this it grows no more.
+        /// Speed below which the force grows no more.
         least_mps: f64,
     },
     /// A power of the speed.
@@ -53,7 +53,7 @@ pub enum Law {
     FastInCold {
         /// Speed at which it is 1, ten kelvin below `until_degc`.
         at_mps: f64,
-        /// The force ends here.
+        /// Limit at which the force vanishes.
         until_degc: f64,
     },
     /// In proportion to the speed, from some time in each run on.

@@ -14,9 +14,9 @@ use crate::simulator::{
     EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, TrueDeviations, simulate,
 };
 
-/// Standard deviations within which a trusted value must lie.
+/// Greatest distance of a trusted value from the truth, in standard deviations.
 const STDS_MAX: f64 = 4.0;
-/// Share of the truth that is let pass beyond that: the declared model is not the simulator's.
+/// Further allowance as a share of the truth, since the declared model is not the simulator's.
 const SHARE_MAX: f64 = 0.05;
 
 /// A trusted value that is wrong.
@@ -126,7 +126,7 @@ impl SoakScene {
     ///
     /// # Panics
     ///
-    /// When a snapshot holds what is not finite, or a sample is not accounted for.
+    /// When a snapshot holds a value that is not finite, or a sample is not accounted for.
     pub fn watch(
         &self,
         failure: Option<SensorFailure>,

@@ -1,8 +1,8 @@
 //! Kills, stops and restarts of daemon, controller and client at random moments.
 //!
-//! Invariants after every round: the client reads fresh snapshots of the daemon that lives, without
-//! anything reopened; no epoch came twice or ran backwards; while the daemon was dead or stopped,
-//! nothing older than its time passed for fresh. When all are gone, so are their segments.
+//! Invariants after every round: the client reads fresh snapshots of the daemon that lives, without anything reopened;
+//! no epoch came twice or ran backwards; while the daemon was dead or stopped, no older snapshot passed as fresh. When
+//! all processes are gone, so are their segments of shared memory.
 
 use std::time::Duration;
 
@@ -67,7 +67,7 @@ fn parse(line: &str) -> Option<ClientPoll> {
     })
 }
 
-/// The processes with what is known of them.
+/// The processes and their known state.
 struct Cast<'a> {
     site: DaemonSite,
     programs: &'a Programs,
@@ -254,7 +254,7 @@ impl<'a> Cast<'a> {
 ///
 /// # Panics
 ///
-/// When something of what the module promises does not hold; the message names seed and round.
+/// When an invariant of the module does not hold; the message names seed and round.
 pub fn run(programs: &Programs, rounds: u64, seed: u64) -> FaultsSummary {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut cast = Cast::new(programs);

@@ -14,17 +14,17 @@ use crate::process::{DaemonSite, await_true};
 /// A part of the transport's shared memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SegmentKind {
-    /// Where samples and snapshots lie.
+    /// The memory of samples and snapshots.
     Payload,
-    /// The books of that memory.
+    /// The administration of that memory.
     PayloadBooks,
-    /// Which messages are on their way between two ports.
+    /// The messages on their way between two ports.
     Connections,
-    /// Which ports a service has.
+    /// The ports of a service.
     Services,
-    /// Who waits to be woken.
+    /// The threads that wait to be woken.
     Events,
-    /// How far the samples have been counted.
+    /// The counts of the samples.
     Counts,
 }
 
@@ -49,7 +49,7 @@ impl SegmentKind {
         }
     }
 
-    /// Returns the first byte and end of what is overwritten in a segment of this length.
+    /// Returns the first byte and the end of the overwritten part of a segment of this length.
     const fn range(self, length: u64) -> (u64, u64) {
         match self {
             SegmentKind::Payload => (length / 2, length),

@@ -1,5 +1,5 @@
-//! Eight trains at 200 Hz for as long as one likes, with faults injected: memory stays flat,
-//! latency does not drift, every sample is accounted for.
+//! Eight trains at 200 Hz for any length of time, with injected faults: memory stays flat, latency does not drift,
+//! every sample is accounted for.
 
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
@@ -18,9 +18,9 @@ use crate::process::{DaemonSite, Process, await_true};
 pub const TRAINS: u64 = 8;
 /// Time between two samples of a train.
 const PERIOD: Duration = Duration::from_millis(5);
-/// How long the daemon is stopped at most: longer than its buffers hold.
+/// Greatest time for which the daemon is stopped: longer than its buffers last.
 const STOPPED_MAX_MS: u64 = 4_000;
-/// Memory may grow by so much after the first quarter, in KiB: pages of the allocator.
+/// Greatest growth of the memory after the first quarter, in KiB: pages of the allocator.
 pub(super) const GROWTH_MAX_KIB: u64 = 2_048;
 /// Pipelines of each train.
 const KINDS: [&str; 4] = ["v_mils", "mass_kalman", "trajectory_kalman", "echo"];
@@ -194,7 +194,7 @@ fn cycle_uncounted(controllers: &mut [Controller], random: &mut ChaCha8Rng) {
     controllers.iter_mut().for_each(|it| it.cycle(random, &mut Vec::new()));
 }
 
-/// Stops the daemon while the controllers go on: what the buffers cannot hold is lost, and counted.
+/// Stops the daemon while the controllers go on: samples beyond the buffers are lost, and counted.
 fn stop_for_a_while(
     daemon: &Process,
     stopped_ms_max: u64,

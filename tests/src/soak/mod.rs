@@ -6,7 +6,7 @@
 //!
 //! - [`arguments`]: the command line of `dynocar-soak`
 //! - [`bad_samples`]: every pipeline under every failure of its sensors
-//! - [`day`]: eight trains for a day in accelerated time, with trouble by the quarter of an hour
+//! - [`day`]: eight trains for a day in accelerated time, with a disturbance in each quarter of an hour
 //! - [`faults`]: kills, stops and restarts of daemon, controller and client
 //! - [`hostile`]: garbage written into shared memory
 //! - [`load`]: eight trains for hours, with faults

@@ -1,7 +1,7 @@
 //! `kill -9` of daemon, controller and client at random moments of their start, and of their work.
 //!
-//! Invariants after every round: once nobody is left, the root is served by the next daemon, and a
-//! sample comes through; or by the one that is there, where another process was killed.
+//! Invariants after every round: after all processes of a root have ended, the next daemon serves it; after another
+//! process was killed, the present daemon still serves it. In both cases a sample comes through.
 
 use std::time::Duration;
 
@@ -11,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 use super::Programs;
 use crate::process::{DaemonSite, Process};
 
-/// A process is killed within this many ms of its start.
+/// Greatest time in ms from the start of a process until it is killed.
 const START_MS: u64 = 60;
 /// Processes that are killed in one round, on one root.
 const STARTS_PER_ROUND: u64 = 10;
@@ -23,7 +23,7 @@ pub struct StartsSummary {
     pub starts: u64,
     /// Roots that were served afterwards.
     pub served: u64,
-    /// Starts of the round's others that were refused: they may go on, and are not to hang.
+    /// Refused starts of the other processes of a round; a refused process must not hang.
     pub refused: u64,
 }
 
@@ -31,7 +31,7 @@ pub struct StartsSummary {
 ///
 /// # Panics
 ///
-/// When a root cannot be served any more, with what the daemon said.
+/// When a root cannot be served any more, with the daemon's messages.
 pub fn run(programs: &Programs, rounds: u64, seed: u64) -> StartsSummary {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut summary = StartsSummary::default();

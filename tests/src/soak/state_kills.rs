@@ -1,4 +1,4 @@
-//! `kill -9` while a state file is written: whatever the moment, a whole state is there.
+//! `kill -9` while a state file is written: at any moment, a whole state is there.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -16,7 +16,7 @@ const FILE: &str = "train-1.state";
 /// The writer is killed within this many µs of its first sign of life.
 const KILLED_WITHIN_US: u64 = 8_000;
 
-/// Returns a state that says which one it is: the number stands in every value.
+/// Returns a state that shows its number: every value holds it.
 fn numbered(number: u64) -> StateContent {
     // Lengths differ, so that a file mixed from two would show.
     let estimate = |pipeline: u64| StoredEstimate {

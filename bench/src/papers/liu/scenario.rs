@@ -1,9 +1,9 @@
-//! Liu's coasting runs, with assumptions for the conditions that the paper leaves open, and the Cramér-Rao bound,
-//! computed.
+//! Liu's coasting runs, with assumptions for the conditions that the paper leaves open, and the Cramér-Rao bound
+//! computed from them.
 //!
-//! The speeds are noisy, sometimes wild, and rounded: a sample is the number of the step that it
-//! falls on. Its Fisher information about the true speed is the sum over steps of
-//! (dp/dspeed)² / p, averaged over where in a step the true speed lies.
+//! The speeds have noise and outliers and are rounded: a sample is the number of the rounding step that it falls on.
+//! Its Fisher information about the true speed is the sum over steps of (dp/dspeed)² / p, averaged over where in a step
+//! the true speed lies.
 
 use dynocar_model::simulate::motion::{SimulatedMotion, advance};
 use dynocar_model::train::Davis;
@@ -13,7 +13,7 @@ use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 use crate::chance::Chance;
 use crate::statistics::jacobian;
 
-/// Table 1's last row, near enough: w0 = 2.2 + 0.025 v + 0.0013 v² in N/kN, v in km/h.
+/// Approximately the last row of table 1: w0 = 2.2 + 0.025 v + 0.0013 v² in N/kN, v in km/h.
 pub const THETA_KMH: [f64; 3] = [2.2, 0.025, 0.0013];
 /// Rotating-mass factor.
 pub const ROTATING_MASS_FACTOR: f64 = 0.06;

@@ -42,7 +42,7 @@ impl FisherInformation {
 
     /// Returns the same with a constant acceleration of unknown size besides the known forces.
     pub fn mass_std_with_bias(&self) -> f64 {
-        // The constant is what the first polynomial of z1 multiplies.
+        // The constant is the coefficient of the first polynomial of z1.
         let (own, cross, other) = (self.matrix[(0, 0)], self.matrix[(0, 1)], self.matrix[(1, 1)]);
         (own - cross * cross / other).powf(-0.5)
     }

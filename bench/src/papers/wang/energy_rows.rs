@@ -1,9 +1,8 @@
 //! Figure 10: the effect of the learned mass on the traction energy of a leg.
 //!
-//! The empty train of 110 t runs from the second station to the first. Its controller plans a
-//! speed profile over the place and computes the force from an assumed mass: 117.1 t, as if the
-//! testers of Table 3 were always on board, or the mass that the filter has learned on the leg
-//! before.
+//! The empty train of 110 t runs from the second station to the first. Its controller plans a speed for each place and
+//! computes the force from an assumed mass: 117.1 t, as if the testers of Table 3 were always on board, or the mass
+//! that the filter has learned on the previous leg.
 
 use super::ride::{kalman, known_resistance, leg, measure};
 use super::shuttle::{
@@ -24,11 +23,11 @@ const BRAKING_MPS2: f64 = 0.7;
 /// Gain of the closed-loop control in 1/s: the feed-forward control has none.
 const CLOSED_LOOP_PER_S: f64 = 0.5;
 
-/// Who drives what.
+/// A train and the gain and assumed mass of its controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Case {
-    /// The force is what the assumed mass needs for the planned acceleration at this place, corrected by the error
-    /// of the speed with this gain.
+    /// Gain of the correction by the error of the speed, added to the force that the assumed mass needs for the planned
+    /// acceleration at this place.
     gain_per_s: f64,
     mass_kg: f64,
     assumed_kg: f64,

@@ -17,7 +17,7 @@ use crate::statistics::mean;
 /// Mass in kg and published deviation in % of each line of Table 3.
 const TABLE_3: [(f64, f64); 3] = [(110_000.0, 2.45), (117_100.0, 3.08), (114_000.0, 2.55)];
 
-/// Forces on the leg beyond the model.
+/// Forces on the leg that the model lacks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Condition {
     Calm,

@@ -20,7 +20,7 @@ use crate::statistics::KMH;
 
 const SERVICE_BRAKE_MPS2: f64 = 0.7;
 
-/// Decides on traction minus brake in N that is wanted now on the way to a stop at a chainage in m.
+/// Returns the wanted traction minus brake force in N on the way to a stop at a chainage in m.
 pub type RideDriver<'a> = dyn FnMut(&Shuttle, &ShuttleMoment, f64) -> f64 + 'a;
 
 /// Powers to the limit, lets the speed fall by 6 km/h while coasting, brakes for lower limits
@@ -246,8 +246,8 @@ pub fn wind(quadratic: f64, seed: u64) -> impl FnMut(f64) -> f64 {
     }
 }
 
-/// Returns an unexplained acceleration drawn from what the mass filter presumes: one of its behaviours,
-/// all alike likely; seeds in a row take the behaviours in turn.
+/// Returns an unexplained acceleration drawn from one of the mass filter's bias models, all equally likely; successive
+/// seeds take the models in turn.
 pub fn presumed(seed: u64) -> impl FnMut(f64) -> f64 {
     let models = MassKalmanSettings::default().bias_models();
     let model = models[(seed % models.len() as u64) as usize];

@@ -1,8 +1,7 @@
 //! The train and the line of Wang 2022's scenario.
 //!
-//! The paper gives Table 1 (110 t empty) and Table 2 (z1, z2, z3), 200 ms and 28,000 samples a
-//! crossing. The line is synthetic: 28 km with four stations, gradients, curves and tunnels,
-//! driven to and fro.
+//! The paper gives Table 1 (110 t empty), Table 2 (z1, z2, z3), a period of 200 ms and 28,000 samples a crossing. The
+//! line is synthetic: 28 km with four stations, gradients, curves and tunnels, driven in both directions.
 
 use std::sync::Arc;
 

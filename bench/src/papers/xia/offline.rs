@@ -197,8 +197,8 @@ pub fn noise_rows(seeds: Seeds) -> Vec<PaperRow> {
     ]
 }
 
-/// The minimum of the paper's deviation within bounds, with the first measured speed for
-/// v_0: what Algorithm 1 finds at best.
+/// The minimum of the paper's deviation within bounds, with the first measured speed for v_0: the best possible result
+/// of Algorithm 1.
 struct PaperDeviation<'a> {
     run: &'a NoiseFreeRun,
     speeds_mps: &'a [f64],

@@ -1,8 +1,8 @@
 //! Table 4: coefficients that switch on the way, estimated online.
 //!
-//! Settling: km from a switch until the error of w0 at the driven speed stays below 0.1 N/kN
-//! without noise, and below 1 N/kN with noise, twice what any window of 2 km can resolve; 8 km at
-//! most. The error with noise is taken from km 64 on, but for the 8 km after the switch at km 82.
+//! Settling: km from a switch until the error of w0 at the driven speed stays below 0.1 N/kN without noise, and below 1
+//! N/kN with noise, twice the best resolution of any window of 2 km; 8 km at most. The error with noise is taken from
+//! km 64 on, but for the 8 km after the switch at km 82.
 
 use dynocar_core::filter::levenberg_marquardt::ParameterBox;
 use dynocar_estimators::xia::trajectory::hypothesis::{JumpHypothesis, OutlierModel};

@@ -1,9 +1,9 @@
 //! Seeded runs of the CRH380C of Xia 2023 with assumptions for the conditions that the paper leaves open (line, forces,
 //! noise), and the Cramér-Rao bound from a run's own numerical Jacobian.
 //!
-//! M = 981.7 t, γ = 0.06, traction up to min(520, 18240 / v) kN, 100 m sampling, white noise of
-//! 0.18 m/s on the speed (a mean square of 0.05 at the truth, the paper's ε1, leaves room for
-//! just that). The truth moves by eq. 7, as the paper's own data do (mean squares of 1e-9).
+//! M = 981.7 t, γ = 0.06, traction up to min(520, 18240 / v) kN, 100 m sampling, white noise of 0.18 m/s on the speed
+//! (the paper's ε1, a mean square of 0.05 at the true coefficients, allows no more). The truth moves by eq. 7, as the
+//! paper's own data do (mean squares of 1e-9).
 
 use dynocar_core::filter::triangular::{TriangularAccumulator, TriangularSystem};
 use dynocar_estimators::xia::trajectory::step::TrajectoryStep;

@@ -1,4 +1,4 @@
-//! `dynocar brakes`: the brake as train protection asks for it, from recorded stops.
+//! `dynocar brakes`: the brake parameters that train protection needs, from recorded stops.
 
 use std::path::{Path, PathBuf};
 
@@ -136,7 +136,7 @@ fn studied(
     Ok((datasets, study))
 }
 
-/// Returns why there are no parameters, and what remains.
+/// Returns the reasons why there are no parameters, and the remaining possibilities.
 fn without_law(study: &Study) -> Failure {
     let mut words =
         format!("none of {} stops to fit is one by all of the brake", study.stops.len());
@@ -303,7 +303,7 @@ fn text(answer: &BrakesAnswer, gamma: f64) -> String {
     text
 }
 
-/// Returns the deceleration over speed: what is certain and in the steps, the bound, and the mean.
+/// Returns the deceleration over speed: the steps, the bound, and the mean.
 fn picture(parameters: &BrakeParameters, law: &DecelerationLaw) -> String {
     const WIDTH: f64 = 56.0;
     let most = law.points.iter().map(|it| it.deceleration_mps2).fold(0.1, f64::max);

@@ -25,8 +25,7 @@ use dynocar::output::{give, require_file, require_folder};
 ///
 /// # Errors
 ///
-/// When the path leads to nothing known or a file is wrong; everything that could be read has
-/// been reported by then.
+/// When the path leads to no known kind of file or a file is wrong; the readable parts have been reported by then.
 pub fn run(arguments: &CheckArguments) -> Result<(), Failure> {
     let (path, json) = (&arguments.path, arguments.json.as_deref());
     let source = DatasetSource { path, train: arguments.train.map(TrainId) };
@@ -66,11 +65,11 @@ pub enum SamplesOfRuns {
     Dropped,
 }
 
-/// Reads whatever a path leads to; the errors of single runs are within.
+/// Reads the file or folder at a path; the result holds the errors of single runs.
 ///
 /// # Errors
 ///
-/// When the path leads to nothing known, or a file that everything rests on is wrong.
+/// When the path leads to no known kind of file, or a file that everything rests on is wrong.
 pub fn understand(source: DatasetSource, samples: SamplesOfRuns) -> Result<Understood, Failure> {
     let path = source.path;
     if source.train.is_some() || !path.is_file() || dataset::is_recording(path) {

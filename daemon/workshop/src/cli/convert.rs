@@ -30,12 +30,12 @@ pub struct ConvertArguments {
     /// The line's file, beside --train-file
     #[arg(long, value_name = "FILE", requires = "train_file")]
     track_file: Option<PathBuf>,
-    /// Print only what is wrong
+    /// Print only problems
     #[arg(long)]
     quiet: bool,
 }
 
-/// Converts, and says what became of the recording.
+/// Converts, and reports the outcome.
 ///
 /// # Errors
 ///
@@ -102,7 +102,7 @@ fn to_parquet(arguments: &ConvertArguments, dataset: Option<&PathBuf>) -> Result
     let written = match dataset {
         None => write_folder(from, output),
         Some(dataset) => {
-            // A dataset becomes what a controller would have had recorded.
+            // A dataset first becomes the recording that a controller's samples would have given.
             let place = tempfile::tempdir().map_err(Failure::work)?;
             let recording = place.path().join("dataset.mcap");
             from_dataset(dataset, &recording)?;

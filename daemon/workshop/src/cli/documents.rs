@@ -16,7 +16,7 @@ pub struct ManArguments {
     out: PathBuf,
 }
 
-/// Writes the pages of these commands.
+/// Writes the manual pages of these commands.
 ///
 /// # Errors
 ///

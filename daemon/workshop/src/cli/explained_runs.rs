@@ -1,4 +1,5 @@
-//! The runs of a dataset that is explained: in memory where they are few, else those that the search looks at.
+//! The runs of a dataset that is explained: all of them in memory where they are few, else only those that the search
+//! uses.
 
 use std::borrow::Cow;
 use std::path::PathBuf;
@@ -19,7 +20,7 @@ use dynocar_shared::TrainId;
 
 /// The runs of a dataset.
 pub struct ExplainedRuns {
-    /// All of them; of many, what is known of each but its samples.
+    /// All runs; where they are many, without their samples.
     pub dataset: Dataset,
     path: PathBuf,
     train: Option<TrainId>,
@@ -27,7 +28,7 @@ pub struct ExplainedRuns {
     many: Option<ManyRuns>,
 }
 
-/// Runs of which some are in memory.
+/// Many runs, of which some are in memory.
 struct ManyRuns {
     folder: FilesOfDataset,
     head: DatasetHead,
@@ -131,7 +132,7 @@ impl ExplainedRuns {
         run.map(Cow::Owned).map_err(|error| self.unusable(error))
     }
 
-    /// Returns the failure of a run that cannot be used, with what may be the matter.
+    /// Returns the failure of a run that cannot be used, with the possible causes.
     fn unusable(&self, error: RunDataError) -> Failure {
         let RunDataError::Simulate { file, source } = error;
         let label =

@@ -76,7 +76,7 @@ pub struct IdentifyAnswer {
     between_runs: Option<Vec<EstimatorSpread>>,
 }
 
-/// Runs the estimators and prints what they learned.
+/// Runs the estimators and prints their estimates.
 ///
 /// # Errors
 ///
@@ -209,7 +209,7 @@ pub fn text(answer: &IdentifyAnswer) -> String {
         for (name, value) in &it.values {
             let std = it.std.get(name).copied().unwrap_or(f64::NAN);
             let (half, unit) = (HALF_95 * std, unit_of(name));
-            // Two digits of what is uncertain.
+            // The uncertain part is shown to two digits.
             let decimals = (1.0 - half.log10().floor()).clamp(0.0, 9.0) as usize;
             text += &format!("    {name:<24} {value:>12.decimals$} ± {half:.decimals$}{unit}\n");
         }

@@ -1,4 +1,4 @@
-//! `dynocar import`: a train and a line out of other projects' files.
+//! `dynocar import`: a train and a line from other projects' files.
 
 mod answer;
 
@@ -17,7 +17,7 @@ use dynocar::output::{print, require_folder, require_new, write_new_in_folder};
 
 /// Import trains and lines of railtoolkit, TTOBench or OSRD.
 ///
-/// It writes train.toml and track.toml, and reports what became of every field. Nothing is overwritten.
+/// It writes train.toml and track.toml, and reports the outcome of every field. Nothing is overwritten.
 #[derive(Debug, Args)]
 pub struct ImportArguments {
     /// The files: YAML of railtoolkit, JSON of TTOBench or OSRD

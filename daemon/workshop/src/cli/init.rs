@@ -21,7 +21,7 @@ use recordings::Draft;
 use summary::{DAEMON_FILE, Described};
 
 const WRITER: &str = "dynocar init";
-/// Units that the values did not reveal are corrected this many times at most.
+/// Greatest number of corrections of units that the values did not reveal.
 const CORRECTIONS_MAX: usize = 4;
 
 /// Writes the first description.
@@ -56,7 +56,7 @@ pub fn execute(arguments: &InitArguments) -> Result<(), Failure> {
     Ok(print(&summary::text(folder, &train, described.as_ref()))?)
 }
 
-/// Reads the recordings, guesses what they hold, and reads them once more as that.
+/// Reads the recordings, guesses the meaning of their columns, and reads them once more with it.
 fn describe(
     arguments: &InitArguments,
     train: &mut TrainText,

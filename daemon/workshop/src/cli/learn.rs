@@ -23,11 +23,11 @@ use dynocar::output::{print, require_files, write_file};
 
 /// Turn recorded runs into candidate models, while trains run.
 ///
-/// It learns at the start, when the daemon's residual monitor suspects something new, and at an hour of the day,
-/// and puts what the model in force lacks into the store as a candidate.
+/// It learns at the start, when the daemon's residual monitor suspects something new, and at an hour of the day, and
+/// puts effects that the model in force lacks into the store as a candidate.
 #[derive(Debug, Args)]
 pub struct LearnArguments {
-    /// The daemon's configuration: the trains, what is declared of them, the log
+    /// The daemon's configuration: the trains, their declared files, the log
     #[arg(long, value_name = "FILE")]
     config: PathBuf,
     /// The folder of recorded runs: datasets and recordings at any depth, a flight recorder's ring too
@@ -53,8 +53,8 @@ pub struct LearnArguments {
 ///
 /// # Errors
 ///
-/// A wrong configuration or name of a result is an input failure; what goes wrong at work ends a round, and
-/// the command only where it was to learn once.
+/// A wrong configuration or name of a result is an input failure. A failure during the work ends a round; it ends the
+/// command only if that was to learn once.
 pub fn execute(arguments: &LearnArguments) -> Result<(), Failure> {
     arguments.threads.or_one().work(|| learn(arguments))?
 }

@@ -1,5 +1,5 @@
-//! The commands of the workshop, one file each; `check`, `explain` and `identify` answer other callers, too. A user
-//! calls them as `dynocar`'s.
+//! The commands of the workshop, one file each; `check`, `explain` and `identify` serve other callers, too. Users call
+//! them through `dynocar`.
 
 pub mod brakes;
 pub mod check;
@@ -87,7 +87,7 @@ impl Command {
             Command::Stops(arguments) => &arguments.json,
             Command::Brakes(arguments) => &arguments.json,
             Command::Survey(arguments) => &arguments.json,
-            // `check` has an answer of its own for what is wrong.
+            // `check` has an answer of its own for errors.
             _ => return None,
         };
         json.as_deref()

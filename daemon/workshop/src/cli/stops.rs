@@ -1,4 +1,4 @@
-//! `dynocar stops`: a brake whose force nobody measured, from recorded stops.
+//! `dynocar stops`: deceleration and stopping distance from recorded stops, without a measured brake force.
 
 use std::path::{Path, PathBuf};
 
@@ -92,7 +92,7 @@ struct StopsAnswer {
     study: Study,
 }
 
-/// Studies the stops and prints what they say.
+/// Studies the stops and prints the results.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! `dynocar survey`: a line that nobody surveyed, from raw recordings with GNSS.
+//! `dynocar survey`: an unsurveyed line from raw recordings with GNSS.
 
 use std::path::PathBuf;
 

@@ -1,11 +1,11 @@
-//! `--threads`: on how many cores a command works. The answer is the same whatever the number.
+//! `--threads`: the number of cores on which a command works. The answer does not depend on it.
 
 use clap::Args;
 use rayon::ThreadPoolBuilder;
 
 use dynocar::cli::Failure;
 
-/// More threads than any machine has cores for this work.
+/// Greatest number of threads: more than any machine has cores.
 const THREADS_MAX: usize = 1024;
 
 /// On how many cores to work.
@@ -23,7 +23,7 @@ fn count(text: &str) -> Result<usize, String> {
 }
 
 impl Threads {
-    /// On one core where nothing is said: beside a daemon that drives trains.
+    /// Returns one core where no number is given: such a command runs beside a daemon that serves trains.
     pub fn or_one(self) -> Self {
         Threads { count: self.count.or(Some(1)) }
     }

@@ -14,11 +14,11 @@ use toml::Value;
 use dynocar::cli::Failure;
 use dynocar::cli::text::{WIDTH, wrap};
 
-/// Mass of a metre of train in t/m, where only one of mass and length is known.
+/// Mass of a metre of train in t/m, used where only mass or only length is known.
 const MASS_PER_LENGTH_T_PER_M: f64 = 2.0;
 /// Mass in t of a train of which nothing is known: a regional multiple unit.
 const MASS_DEFAULT_T: f64 = 200.0;
-/// Length of a car in m, for their number.
+/// Length of a car in m, from which the number of cars follows.
 const CAR_LENGTH_M: f64 = 25.0;
 /// Inertia of the rotating parts over the mass: 0.03 for a loaded freight train, 0.1 for a motor
 /// coach, 0.2 for a light locomotive.
@@ -143,7 +143,7 @@ impl TrainArguments {
         ]
     }
 
-    /// Returns the default of a key beside what is said, as `train.toml` writes it.
+    /// Returns the default of a key, given these arguments, as `train.toml` writes it.
     ///
     /// # Errors
     ///
@@ -189,11 +189,12 @@ impl TrainArguments {
         }
     }
 
-    /// Returns the `train.toml` by a command: what is said, else what was found, else a marked default.
+    /// Returns the `train.toml` that a command writes, each value from the arguments, else from the found values, else
+    /// a marked default.
     ///
     /// # Errors
     ///
-    /// A figure that no train has is an input failure.
+    /// A value that is impossible for a train is an input failure.
     pub fn text(&self, writer: &str, found: &TrainValues) -> Result<TrainText, Failure> {
         let known_length_m = self.length_m.or(found.number(LENGTH.name));
         let mass_t = self.mass_t.or(found.number(MASS.name)).unwrap_or_else(|| {
@@ -250,7 +251,7 @@ impl TrainArguments {
         let inertial_kg = 1e3 * mass_t * (1.0 + inertia.unwrap_or(ROTATING_MASS_DEFAULT));
         efforts(&mut text, found, inertial_kg);
         let text = text.into_text();
-        // The file's own reader judges the figures; only what was given can be wrong.
+        // The reader of the file checks the values; only given values can be wrong.
         parse_train("train", &text)
             .map_err(|error| Failure::Input(format!("the train as given: {}", error.words)))?;
         Ok(TrainText { text, defaults: marked })

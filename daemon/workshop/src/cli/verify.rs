@@ -19,16 +19,16 @@ pub struct VerifyArguments {
     /// The recording; of one that rotated, its files in order
     #[arg(required = true)]
     recording: Vec<PathBuf>,
-    /// Also say what this configuration of the daemon would have estimated
+    /// Also print the estimates that this configuration of the daemon would have given
     #[arg(long, value_name = "FILE")]
     with: Option<PathBuf>,
 }
 
-/// Computes every snapshot of a recording again, and says what became of them.
+/// Computes every snapshot of a recording again, and reports the comparison.
 ///
 /// # Errors
 ///
-/// When it holds none, there is nothing to compute them by, or one is another.
+/// When the recording holds no snapshots or no configuration, or a computed snapshot differs.
 pub fn execute(arguments: &VerifyArguments) -> Result<(), Failure> {
     let VerifyArguments { recording: paths, with } = arguments;
     let recording = &if paths.iter().any(|it| is_parquet_path(it)) {

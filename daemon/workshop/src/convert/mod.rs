@@ -1,8 +1,8 @@
 //! Recordings to datasets, without loss.
 //!
-//! A dataset made of a recording holds each sample as a row with all of its fields under their own
-//! names, of which `dataset.toml` maps what a dataset knows; from such rows the same samples come back,
-//! to the bit. A recording made of a dataset has the dataset's files attached, and gives those back.
+//! A dataset made of a recording holds each sample as a row with all of its fields under their own names;
+//! `dataset.toml` maps those that are quantities of a dataset. From such rows the same samples come back, to the bit. A
+//! recording made of a dataset has the dataset's files attached, and gives them back.
 
 mod recorded_dataset;
 mod rows;

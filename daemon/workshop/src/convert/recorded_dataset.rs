@@ -1,4 +1,4 @@
-//! A dataset that a recording is, in memory: its files by their names, and runs that are samples.
+//! A recording as a dataset in memory: its files by their names, and runs that are samples.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -14,13 +14,13 @@ use super::rows::{columns_of_samples, to_rows};
 /// Contents of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FileContent {
-    /// Bytes that are attached.
+    /// Bytes of an attached file.
     Bytes(Vec<u8>),
-    /// A run that was recorded.
+    /// Samples of a recorded run.
     Samples(Vec<TrainSample>),
 }
 
-/// A dataset that a recording is.
+/// A recording as a dataset.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordedDataset {
     recording: PathBuf,

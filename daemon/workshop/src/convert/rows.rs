@@ -1,4 +1,4 @@
-//! Samples as rows of CSV, and back, to the bit; of NaN there is one.
+//! Samples as rows of CSV, and back, to the bit, except that every NaN becomes the same one.
 
 use dynocar_analysis::dataset::{ColumnMapping, RunColumn, RunColumns};
 use dynocar_shared::layout::Words;
@@ -8,21 +8,21 @@ use dynocar_shared::{TrainId, TrainSample};
 
 use dynocar_mcap::schema::SAMPLE_FIELDS;
 
-/// Column of the wheel-slide bit of `flags`, for a dataset knows no bits.
+/// Column of the wheel-slide bit of `flags`, because a column of a dataset cannot be a bit.
 pub const WHEEL_SLIDE: &str = "wheel_slide";
 
-/// Why a text holds no samples.
+/// Error of a text that holds no samples.
 #[derive(Debug, thiserror::Error)]
 pub enum RowError {
-    /// It is no CSV.
+    /// The text is not CSV.
     #[error("{file}: {source}")]
     Csv {
         /// The file.
         file: String,
-        /// Where, and what is wrong.
+        /// Place and kind of the error.
         source: csv::Error,
     },
-    /// A cell is no number of its field's type.
+    /// A cell is not a number of its field's type.
     #[error("{file}:{line}: {column} = {cell:?}: expected a number of type {expected}")]
     Cell {
         /// The file.

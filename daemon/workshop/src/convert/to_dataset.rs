@@ -1,4 +1,4 @@
-//! A recording to a dataset.
+//! Conversion of a recording to a dataset.
 
 use std::borrow::Cow;
 use std::path::{Component, Path, PathBuf};
@@ -20,7 +20,7 @@ use super::rows::WHEEL_SLIDE;
 use dynocar_mcap::error::{AtPath, ReadError};
 use dynocar_mcap::recording::Recording;
 
-/// Samples for each time that the numbers begin anew, at least: below it they are of several controllers.
+/// Least number of samples for each restart of their numbering; a recording with fewer is of several controllers.
 const RESTARTS_RARE: usize = 20;
 
 /// Files of the train and the line for a recording to which none are attached.
@@ -81,7 +81,7 @@ pub enum NoDataset {
         /// The train.
         train: u64,
     },
-    /// Another tool has merged what several controllers published under one number.
+    /// Another tool has merged samples that several controllers published under one number.
     #[error(
         "the numbers of train {train}'s samples go back and forth: another tool has merged recordings of \
          several controllers; convert each of them by itself"
@@ -126,7 +126,7 @@ pub fn to_dataset(
     unpack(&paths[0], Recording::of_samples(paths)?, folder, train, files)
 }
 
-/// Writes what a recording holds as a dataset into a new folder; `path` names it.
+/// Writes the contents of a recording as a dataset into a new folder; `path` names the recording.
 ///
 /// # Errors
 ///
@@ -148,7 +148,7 @@ pub fn unpack(
     Ok(unpacked)
 }
 
-/// Returns what a recording holds as a dataset; `path` names it.
+/// Returns the contents of a recording as a dataset; `path` names the recording.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! The runs that there are: of datasets in a folder, which may come and go, and of recordings.
+//! The available runs: those of datasets in a folder, which may come and go, and of recordings.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -18,15 +18,15 @@ use dynocar::dataset::read_text;
 use dynocar::models::UtcSecond;
 use dynocar::text_file::read_beginning;
 
-/// So much of a file shows when it was recorded.
+/// Length of the beginning of a file that shows the time of its recording.
 const BEGINNING_BYTES: u64 = 1 << 16;
-/// How deep folders lie in the folder of runs.
+/// Greatest depth of folders in the folder of runs.
 const DEPTH_MAX: usize = 6;
 
 /// A recorded run of a train.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FoundRun {
-    /// Its name among all: the path of its dataset in the folder of runs, and its file.
+    /// Its unique name: the path of its dataset in the folder of runs, and its file.
     pub name: String,
     /// The folder of its dataset.
     pub dataset: PathBuf,
@@ -130,8 +130,8 @@ fn look(folder: &Path, depth: usize, lying: &mut Lying) -> io::Result<()> {
     Ok(())
 }
 
-/// Returns true for what is of a train: all where there is one train only, else what lies in a folder named by
-/// the train's number, as `7` or `train=7`; a recording outside of such may hold any train.
+/// Returns whether a path belongs to a train: every path where there is one train only, else a path in a folder named
+/// by the train's number, as `7` or `train=7`; a recording outside such folders may hold any train.
 fn is_of(train: TrainId, path: &Path, places: Places) -> bool {
     let inside = path.strip_prefix(places.runs).unwrap_or(path);
     let number = |part: Component| {
@@ -212,7 +212,7 @@ fn hash_of(path: &Path, memory: &mut LearnerMemory) -> io::Result<(String, UtcSe
     Ok((sha256, UtcSecond::from_time(modified)))
 }
 
-/// When a run was recorded by what its file or its dataset says.
+/// Returns the time at which a run was recorded, from its file or its dataset.
 fn by_file(manifest: &Manifest, entry: &RunEntry, path: &Path) -> Option<UtcSecond> {
     let beginning = || {
         let bytes = read_beginning(path, BEGINNING_BYTES).ok()?;
@@ -223,8 +223,8 @@ fn by_file(manifest: &Manifest, entry: &RunEntry, path: &Path) -> Option<UtcSeco
     Some(UtcSecond { unix_s })
 }
 
-/// When a run was recorded: when its file was changed, unless its path names another day, as
-/// `2026-11-23` or `day=2026-11-23`.
+/// Returns the time at which a run was recorded: that of the last change of its file, unless its path names another
+/// day, as `2026-11-23` or `day=2026-11-23`.
 fn by_path(path: &Path, modified: UtcSecond) -> UtcSecond {
     let day = |part: Component| -> Option<UtcSecond> {
         let part = part.as_os_str().to_str()?;

@@ -1,4 +1,4 @@
-//! Conclusion of an explanation for the store: a candidate, events, or nothing that is not there already.
+//! Conclusion of an explanation for the store: a candidate, events, or nothing new.
 
 use std::path::Path;
 
@@ -39,7 +39,7 @@ pub struct Explained {
     pub question: Option<OpenQuestion>,
 }
 
-/// An explanation, with what it was made of.
+/// An explanation with its inputs.
 pub struct Conclusion<'a> {
     /// The train's part of the store.
     pub models: &'a TrainModels,
@@ -58,11 +58,11 @@ pub struct Conclusion<'a> {
 }
 
 impl Conclusion<'_> {
-    /// Puts into the store what an explanation says and the store does not hold yet.
+    /// Puts the findings of an explanation that the store does not hold yet into the store.
     ///
     /// # Errors
     ///
-    /// When the store gives or takes nothing, or the report cannot be made.
+    /// When the store cannot be read or written, or the report cannot be made.
     pub fn draw(&self, memory: &LearnerMemory) -> Result<Explained, LearnError> {
         let &Conclusion { models, in_force, text, pool, explanation, now, .. } = self;
         let answer = &explanation.answer;
@@ -160,7 +160,7 @@ impl Conclusion<'_> {
     }
 }
 
-/// Writes an event down unless every run of it was reported before; what is reported again is left out.
+/// Writes an event unless all of its runs were reported before; the runs that were are left out.
 fn put_event(models: &TrainModels, mut event: MaintenanceEvent) -> Result<Option<u64>, LearnError> {
     let known = models.events()?;
     let is_known = |window: &EventWindow| {

@@ -16,12 +16,12 @@ use super::pool::Pool;
 use dynocar::models::origin::{EventWindow, HeldOutError};
 use dynocar::models::{FoundEffect, MaintenanceEvent, ModelFigure, ModelHash, UtcSecond};
 
-/// Returns whether a kind acts in the runs in which it is found and in no others, wherever the answer names none.
+/// Returns whether a kind acts only in the runs in which it is found, even where the answer names no runs.
 fn is_passing(kind: &str) -> bool {
     EffectKind::from_name(kind).is_some_and(|kind| policy_of(kind).is_passing)
 }
 
-/// Returns an effect as records hold it.
+/// Returns an effect in the form in which records hold it.
 pub fn found_effect(effect: &EffectAnswer) -> FoundEffect {
     FoundEffect {
         kind: effect.kind.into(),

@@ -35,7 +35,7 @@ pub struct LearnerSettings {
     pub runs: PathBuf,
     /// The trains, each with the model that the configuration declares.
     pub trains: Vec<(TrainId, ModelText)>,
-    /// Bounds of what is explained together.
+    /// Bounds of the runs that are explained together.
     pub bounds: Bounds,
     /// The command, as the origin of a model names it.
     pub command: String,
@@ -125,7 +125,7 @@ impl Learner {
     ///
     /// # Errors
     ///
-    /// See [`LearnError`]; what was put into the store before is there for good.
+    /// See [`LearnError`]; earlier entries of the round stay in the store.
     pub fn round(
         &mut self,
         now: SystemTime,
@@ -152,7 +152,7 @@ impl Learner {
         let models = self.settings.store.train(train);
         let in_force = match models.in_force()? {
             Some(hash) => hash,
-            // So that what grows from it has a parent in the store.
+            // So that models that are updated from it have a parent in the store.
             None => models.put_declared(declared, now)?,
         };
         let bounds = self.settings.bounds;
@@ -211,7 +211,7 @@ impl Learner {
                 now,
             };
             let explained = conclusion.draw(&self.memory)?;
-            // The first words on what is open stand; more runs may only settle it.
+            // The first statement of an open question stays; more runs may only settle it.
             if verdict == Verdict::Effect || outcome == RoundOutcome::TooFewRuns {
                 outcome = RoundOutcome::Explained(Box::new(explained));
             }

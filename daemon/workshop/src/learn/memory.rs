@@ -1,5 +1,5 @@
-//! Memory of the learner from round to round. It saves work and repetition, and nothing depends on it: a lost
-//! memory is begun anew, and candidates and events are in the store.
+//! Memory of the learner from round to round. It saves work and repetition, and no result depends on it: a lost memory
+//! starts anew, since candidates and events are in the store.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -13,9 +13,9 @@ use dynocar::state::{StateError, StateProblem, file};
 
 /// The file of the memory.
 const FILE: &str = "learn.state";
-/// Files that are remembered; more are hashed anew in each round.
+/// Greatest number of remembered files; further files are hashed anew in each round.
 const FILES_MAX: usize = 2000;
-/// Problems and questions that are remembered; more are reported again.
+/// Greatest number of remembered problems and questions; further ones are reported again.
 const REPORTED_MAX: usize = 400;
 
 /// A file whose content is known.
@@ -65,7 +65,7 @@ pub struct LearnerMemory {
     /// Why something cannot be used, by the hash of its content.
     #[serde(default)]
     pub unusable: BTreeMap<String, String>,
-    /// Digest of what was explained last, by train.
+    /// Digest of the inputs of the last explanation, by train.
     #[serde(default)]
     pub explained: BTreeMap<String, String>,
     /// Reported open questions.

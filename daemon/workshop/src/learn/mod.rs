@@ -1,19 +1,19 @@
 //! Learning from recorded runs: a companion of the daemon that collects runs, explains them against the model in force,
 //! and puts its findings into the store of models. It is never in the control cycle.
 //!
-//! A [`Learner`] works in rounds; clock and folders come from outside, and a round neither sleeps nor
-//! waits. The process around it ([`round_schedule`]) starts a round when a suspicion is new, at an hour, or once.
+//! A [`Learner`] works in rounds; clock and folders come from outside, and a round neither sleeps nor waits. The
+//! process around it ([`round_schedule`]) starts a round at a new suspicion, at a time of each day, or once.
 //!
 //! # Layout, in the order of the work
 //!
 //! - [`memory`]: memory from round to round
-//! - [`recordings`]: recordings, unpacked once
-//! - [`available_runs`]: the runs that there are
-//! - [`pool`]: which runs are explained together, with the model in force as their train and line
+//! - [`recordings`]: recordings, each unpacked once
+//! - [`available_runs`]: the available runs
+//! - [`pool`]: the runs that are explained together, with the model in force as their train and line
 //! - [`finding`]: findings of an explanation: a candidate, events, an open question
 //! - [`conclusion`]: entries for the store
-//! - [`learner`]: a round
-//! - [`round_schedule`]: when there is one
+//! - [`learner`]: a round of learning
+//! - [`round_schedule`]: the times of the rounds
 //! - [`page`]: the history as a page, with the errors that the daemon's trials measured
 
 use std::path::PathBuf;

@@ -1,5 +1,5 @@
-//! The history of all trains' models as one page: the origin of each model, decisions, maintenance events, open questions,
-//! and the error of a train's models by day, as the daemon's trials measured it.
+//! The history of the models of all trains as one page: the origin of each model, decisions, maintenance events, open
+//! questions, and the daily error of a train's models, as the daemon's trials measured it.
 
 use std::collections::BTreeSet;
 use std::time::SystemTime;
@@ -23,11 +23,11 @@ use crate::report::plots::series::{self, DailyErrors};
 use crate::report::plots::{PlotError, figure, wide_and_narrow};
 use crate::report::provenance::Provenance;
 
-/// Returns the page on what a learner's store holds.
+/// Returns the page on the contents of a learner's store.
 ///
 /// # Errors
 ///
-/// When the store cannot be read, or the plot not be drawn.
+/// When the store cannot be read, or the plot cannot be drawn.
 pub fn html(learner: &Learner, now: SystemTime) -> Result<String, LearnError> {
     let settings = learner.settings();
     let made = Provenance::of_files(Vec::new(), settings.command.clone(), now);

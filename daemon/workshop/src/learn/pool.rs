@@ -1,5 +1,5 @@
-//! Runs that are explained together, within bounds of memory and time, as a dataset with the train and line of the model in
-//! force.
+//! Runs that are explained together, within bounds of memory and time: a dataset with the train and line of the model
+//! in force.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -21,18 +21,18 @@ use super::available_runs::{FoundRun, report_unusable};
 use super::memory::LearnerMemory;
 use crate::dataset::FilesOfDataset;
 
-/// Bounds of what is explained together.
+/// Bounds of the runs that are explained together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
-    /// The most runs.
+    /// Greatest number of runs.
     pub runs: usize,
-    /// Their longest time in all.
+    /// Greatest total time of the runs.
     pub time: Duration,
-    /// Their most samples, which bound the memory.
+    /// Greatest number of their samples, which bounds the memory.
     pub samples: usize,
-    /// Runs so recent, counted from the newest, are explained by themselves first.
+    /// Age, counted from the newest run, below which runs are first explained by themselves.
     pub recent: Duration,
-    /// Runs older than this, counted from the newest, are not looked at.
+    /// Age, counted from the newest run, above which runs are not used.
     pub horizon: Duration,
 }
 
@@ -70,7 +70,7 @@ pub fn choices(runs: &[FoundRun], bounds: &Bounds) -> Vec<Vec<FoundRun>> {
     let (older, recent) = runs.split_at(begin);
     let recent = &recent[recent.len().saturating_sub(bounds.runs)..];
     let mut choices = vec![recent.to_vec()];
-    // A quarter is for the older ones in any case: they show what is new.
+    // A quarter is always reserved for the older runs, against which new effects show.
     let own = recent.len().min(bounds.runs - bounds.runs / 4);
     let places = spread(older.len(), bounds.runs - own);
     if !places.is_empty() {
@@ -97,8 +97,8 @@ pub struct Declared<'d> {
     pub track: Option<&'d Arc<Track>>,
 }
 
-/// Reads runs under a model, the newest first until the bounds are reached; what cannot be read is reported once
-/// and left out. `None` where fewer than two are left: one to fit, one to judge.
+/// Reads runs under a model, the newest first until the bounds are reached; unreadable runs are reported once and left
+/// out. `None` where fewer than two are left: one to fit, one to judge.
 pub fn read(
     chosen: &[FoundRun],
     declared: Declared<'_>,

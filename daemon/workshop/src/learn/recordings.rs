@@ -1,4 +1,5 @@
-//! Recordings, unpacked once into a folder of the learner, because the flight recorder's ring deletes the oldest.
+//! Recordings, each unpacked once into a folder of the learner, because the flight recorder's ring deletes the oldest
+//! ones.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -14,14 +15,14 @@ use crate::convert::{ModelFiles, ToDatasetError, to_dataset};
 use dynocar::models::UtcSecond;
 use dynocar::storage::{Disk, Storage, StorageError, part_of};
 
-/// How a finished recording ends.
+/// Last bytes of a finished recording.
 const MCAP_END: &[u8] = b"\x89MCAP0\r\n";
 /// File in an unpacked recording that names its source.
 const SOURCE_FILE: &str = "recording.toml";
-/// The most bytes that the unpacked recordings of a train take.
+/// Greatest total size in bytes of the unpacked recordings of a train.
 const BYTES_MAX: u64 = 4 << 30;
 
-/// Where an unpacked recording came from.
+/// Source of an unpacked recording.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RecordingSource {
     /// The recording's name.
@@ -42,12 +43,12 @@ pub fn is_finished(path: &Path) -> bool {
     end().is_ok_and(|end| end == MCAP_END)
 }
 
-/// Unpacks what a recording holds of a train, unless that was done before; `sha256` is that of its content.
-/// A recording that cannot be used is reported once.
+/// Unpacks the runs of a train from a recording, unless that was done before; `sha256` is the hash of the recording's
+/// content. A recording that cannot be used is reported once.
 ///
 /// # Errors
 ///
-/// When nothing can be unpacked, whatever it holds.
+/// When the unpacked files cannot be written.
 pub fn take_up(
     (recording, sha256): (&Path, &str),
     train: TrainId,

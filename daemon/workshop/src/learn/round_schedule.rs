@@ -1,4 +1,4 @@
-//! The schedule of rounds: on a new suspicion, at an hour, and at the start.
+//! The schedule of rounds: on a new suspicion, at a time of each day, and at the start.
 
 use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,14 +10,14 @@ use tracing::{info, warn};
 
 use super::learner::{Learner, LearnerRound};
 
-/// How often the process looks whether to stop.
+/// Interval at which the process checks whether to stop.
 const TURN: Duration = Duration::from_millis(100);
-/// How often it looks at the snapshots.
+/// Interval at which the process reads the snapshots.
 const LOOK: Duration = Duration::from_secs(2);
-/// So long after a suspicion the runs are looked at again and again: the one that raised it is still being
-/// recorded then.
+/// Time after a suspicion in which the runs are searched repeatedly, since the run that raised it is still being
+/// recorded.
 const AFTERMATH: Duration = Duration::from_secs(3600);
-/// How often.
+/// Interval of these searches.
 const AGAIN: Duration = Duration::from_secs(60);
 /// Seconds of a day.
 const DAY_S: u64 = 86_400;

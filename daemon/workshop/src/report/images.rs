@@ -1,4 +1,4 @@
-//! The report's plots as files of their own.
+//! The report's plots as separate files.
 
 use dynocar_analysis::dataset::{Dataset, Role};
 use dynocar_analysis::explain::Explanation;
@@ -7,7 +7,7 @@ use dynocar_analysis::explain::report::panels::Panel;
 use super::Subject;
 use super::plots::{Plot, PlotError, Width, as_file, line, panel, series, speeds};
 
-/// Names and SVG of every plot of the report: the errors of the runs, the line with what was found along it, the
+/// Returns name and SVG of every plot of the report: the errors of the runs, the line with the findings along it, the
 /// speeds of runs, the residual against covariates.
 ///
 /// # Errors

@@ -1,12 +1,12 @@
-//! An explanation as one page of HTML that can be handed on: no network, no font, and one script
-//! that only adds.
+//! An explanation as one page of HTML that can be passed on: it needs no network, no font, and its only script is
+//! optional.
 //!
 //! # Layout
 //!
 //! - [`mod@page`]: the page from top to bottom; the survey's and the learner's have its head and policy too
-//! - [`sections`]: its parts
+//! - [`sections`]: the sections of the page
 //! - [`plots`]: the plots, as SVG text
-//! - [`mod@images`]: the same as files of their own
+//! - [`mod@images`]: the plots as separate files
 //! - [`html`]: parts of pages: tables, sections, numbers
 //! - [`provenance`]: command, versions, content hash
 //! - `style.css`: the style, for wide and narrow, light and dark, screen and paper

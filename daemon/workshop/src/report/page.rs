@@ -1,5 +1,4 @@
-//! The page from top to bottom, and the common parts of every page, the survey's and the learner's too: head and
-//! policy.
+//! The page from top to bottom, and the head and security policy that the pages of survey and learner have, too.
 
 use std::fmt::Write as _;
 
@@ -24,7 +23,7 @@ const SCRIPT: &str = include_str!("plots.js");
 
 /// Returns a whole page; title, header and main part are HTML.
 ///
-/// Its policy lets it load nothing, and run no script but ours.
+/// Its security policy lets it load nothing, and run no script but its own.
 pub fn document(title: &str, header: &str, main: &str, made: &Provenance) -> String {
     let (version, day, colours) = (made.version, &made.day, colour_rules());
     let hash = STANDARD.encode(Sha256::digest(SCRIPT));

@@ -9,7 +9,7 @@ use crate::dataset;
 use dynocar::dataset::{DatasetSource, LoadError};
 use dynocar::models::moment::UtcSecond;
 
-/// A file and what is in it.
+/// A file and the digest of its content.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileDigest {
     /// Its path in the dataset.
@@ -20,7 +20,7 @@ pub struct FileDigest {
     pub sha256: String,
 }
 
-/// Where a report comes from.
+/// Origin of a report.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Provenance {
     /// The command line.

@@ -1,27 +1,27 @@
-//! Subject of a page.
+//! Subject of a page: a dataset and its explanation.
 
 use dynocar_analysis::dataset::{Dataset, Role};
 use dynocar_analysis::explain::Explanation;
 use dynocar_analysis::explain::report::ReportData;
 use dynocar_analysis::explain::report::errors::RunErrors;
 
-/// Everything that the page is about.
+/// A dataset and its explanation, as the page shows them.
 pub struct Subject<'a> {
     /// The dataset.
     pub dataset: &'a Dataset,
     /// Explanation of the dataset.
     pub explanation: &'a Explanation,
-    /// The same as numbers and words for the page.
+    /// The explanation as numbers and words for the page.
     pub data: ReportData,
 }
 
 impl<'a> Subject<'a> {
-    /// Returns an explanation of a dataset.
+    /// Returns the subject for an explanation of a dataset.
     pub fn new(dataset: &'a Dataset, explanation: &'a Explanation) -> Self {
         Subject { dataset, explanation, data: ReportData::new(dataset, explanation) }
     }
 
-    /// Returns whether an effect was added to the model, so that there is an 'after'.
+    /// Returns whether an effect was added to the model, so that there are values 'after' it.
     pub fn has_effect(&self) -> bool {
         !self.explanation.answer.effects.is_empty()
     }

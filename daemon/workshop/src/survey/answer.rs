@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::read::rows_in_order;
 use super::write::{gradient_entries, late_s, trip_file};
 
-/// All that a survey found.
+/// All findings of a survey.
 #[derive(Debug, Serialize)]
 pub struct SurveyAnswer {
     /// The line.
@@ -68,7 +68,7 @@ pub struct TripAnswer {
 pub struct LearnedAnswer {
     /// Nominal or empty mass in t, without rotating parts.
     pub mass_t: WithStd,
-    /// The same with rotating parts, which is what the balance of forces shows.
+    /// The same with rotating parts, which the balance of forces shows.
     pub inertial_mass_t: WithStd,
     /// Mass of a passenger in kg, where they are counted.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -1,4 +1,4 @@
-//! Raw recordings, surveyed or mapped, to a dataset of trips on a surveyed line: reading, writing and reporting.
+//! From raw recordings to a dataset of trips on a surveyed line: reading, surveying or mapping, writing and reporting.
 //!
 //! - [`read`]: a dataset's runs as recordings; a line that was surveyed before
 //! - [`write`](mod@write): the dataset folder with its trips
@@ -24,7 +24,7 @@ use write::write;
 
 pub use read::SurveyFailure;
 
-/// Stops nearer than this many m to one of a known line have its name.
+/// Distance in m below which a stop takes the name of a stop of the known line.
 const SAME_STOP_M: f64 = 25.0;
 
 /// A survey that was made and written.

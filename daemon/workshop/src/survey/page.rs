@@ -20,7 +20,7 @@ use crate::report::provenance::Provenance;
 /// Width and height of the map.
 const SIZE: (f64, f64) = (980.0, 420.0);
 
-/// Returns the page: map, profile with its band, stops, passes, what was not used and what stays open.
+/// Returns the page: map, profile with its band, stops, passes, unused parts and open questions.
 ///
 /// # Errors
 ///

@@ -191,7 +191,7 @@ pub enum SurveyFailure {
     /// Nothing can be surveyed in it.
     #[error(transparent)]
     Survey(#[from] SurveyError),
-    /// A line's file lacks what a map needs, or its alignment cannot be read.
+    /// A line's file lacks the data that mapping needs, or its alignment cannot be read.
     #[error("{}: {problem}", path.display())]
     SurveyedLine {
         /// The file.

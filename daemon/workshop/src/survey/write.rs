@@ -1,5 +1,5 @@
-//! The dataset that a survey makes: its description, and the file of each trip, with a chainage for each row, in SI units,
-//! forces at the time when they act.
+//! The dataset that a survey makes: its description, and the file of each trip in SI units, with a chainage for each
+//! row and each force at the time when it acts.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -26,7 +26,7 @@ use toml::{Table, Value};
 use super::read::{Material, SurveyFailure, rows_in_order};
 use crate::dataset::open;
 
-/// Length of the beginning by which a file of a survey is known.
+/// Length of the beginning by which a file of a survey is recognised.
 const MARK_LENGTH: usize = 20;
 /// First line of a survey's TOML files.
 const MARK: &str = "# By `dynocar survey`";
@@ -316,7 +316,7 @@ pub fn columns(dataset: &Dataset) -> Vec<TripColumn> {
     COLUMNS.into_iter().filter(is_there).collect()
 }
 
-/// Returns whether the brake force is more than what the pressure says.
+/// Returns whether the brake force has a source of its own besides the pressure.
 fn has_own_brake(run: &Run) -> bool {
     !matches!(run.brake_source, ForceSource::None | ForceSource::Pressure)
 }
@@ -369,7 +369,7 @@ pub fn run_csv(material: &Material, trip: &Trip) -> String {
     text
 }
 
-/// Returns the mass of a row with what was learned of it.
+/// Returns the mass of a row, corrected by the learned masses.
 fn mass_kg(material: &Material, run: &Run, row: usize) -> Option<f64> {
     let declared_kg = run.samples[row].get(SampleField::Mass)?;
     let Some(profile) = &material.survey.profile else { return Some(declared_kg) };

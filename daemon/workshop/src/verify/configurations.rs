@@ -1,4 +1,4 @@
-//! The configurations that are attached to a recording.
+//! The daemon's configurations that are attached to a recording.
 
 use dynocar::config::{ConfigError, DaemonConfig};
 use toml::{Table, Value};
@@ -6,13 +6,13 @@ use toml::{Table, Value};
 use dynocar_mcap::recording::Recording;
 use dynocar_mcap::writing::{CONFIGURATION, folder_of_configuration};
 
-/// Why an attached configuration cannot be used.
+/// Error of an attached configuration that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigurationProblem {
-    /// There is none.
+    /// No configuration is attached.
     #[error("no daemon's configuration is attached: there is nothing to verify by")]
     None,
-    /// It cannot be unpacked.
+    /// The configuration cannot be unpacked.
     #[error(transparent)]
     Unpacking(#[from] std::io::Error),
     /// The configuration is not valid.
@@ -20,10 +20,10 @@ pub enum ConfigurationProblem {
     Malformed {
         /// The folder of the attached files.
         folder: String,
-        /// Problem of the run.
+        /// Problem of the configuration.
         problem: String,
     },
-    /// The daemon of this release refuses it.
+    /// The daemon of this release refuses the configuration.
     #[error("attached {0}")]
     Refused(#[from] ConfigError),
 }
@@ -41,7 +41,7 @@ pub struct Configurations {
 }
 
 impl Configurations {
-    /// Reads what is attached.
+    /// Reads the attached configurations.
     ///
     /// # Errors
     ///
@@ -107,7 +107,7 @@ fn load(recording: &Recording, folder: &str) -> Result<(DaemonConfig, bool), Con
             }
         }
     }
-    // Its folder is on another host; what it would change is said in words.
+    // The folder of states is on another host; the report names it as a possible cause of a difference.
     let keeps_state = table.remove("state").is_some();
     // The models that were in force are attached in place of those declared.
     table.remove("models");

@@ -1,8 +1,8 @@
-//! Every recorded snapshot computed again, from the recorded samples by the recorded configuration or another one, with
-//! the code of the daemon's own pipelines.
+//! Repeated computation of every recorded snapshot from the recorded samples, with the recorded configuration or
+//! another one, and with the code of the daemon's own pipelines.
 //!
-//! A pipeline is a function of its samples from the daemon's start on. A snapshot's `sequence` counts
-//! them, so that it says whether the recording holds them all.
+//! A pipeline is a function of its samples from the daemon's start on. A snapshot's `sequence` counts these samples,
+//! and so shows whether the recording holds them all.
 
 mod configurations;
 mod pipelines;

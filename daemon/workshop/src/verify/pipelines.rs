@@ -1,4 +1,4 @@
-//! One pipeline of one daemon computed again.
+//! Repeated computation of the snapshots of one pipeline of one daemon.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use super::{Configurations, STAMPS};
 use dynocar_mcap::recording::Recording;
 use dynocar_mcap::schema::SNAPSHOT_FIELDS;
 
-/// Where a computed snapshot is another than the recorded one.
+/// A difference between a computed snapshot and the recorded one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SnapshotDifference {
     /// The sample behind both.
@@ -34,8 +34,8 @@ pub enum ComparisonOutcome {
         /// Samples that the pipeline had taken before the first that is recorded.
         before: u64,
     },
-    /// The daemon missed samples that the recording holds, or the other way round: what is recorded
-    /// is not what the pipeline took.
+    /// The daemon missed samples that the recording holds, or the other way round: the recorded samples are not those
+    /// that the pipeline took.
     OtherSamples {
         /// The last sample up to which both agree; none when it is 0.
         agree_up_to: u64,
@@ -141,7 +141,7 @@ fn compare(
             let is_newest = pipeline.snapshot().sample_sequence == it.sample_sequence;
             let missed = it.samples_lost.saturating_sub(pipeline.snapshot().samples_lost);
             if is_newest && missed > 0 {
-                // The daemon counted what a controller that had gone left behind.
+                // The daemon counted the samples that a vanished controller left behind as lost.
                 pipeline.count_up_to(it.sample_sequence + missed);
                 continue;
             }

@@ -1,5 +1,5 @@
-//! The trolley bus whose line nobody surveyed: what `dynocar survey` learns of it, and how far a line
-//! learned without two of its trips predicts their speed.
+//! The trolley bus on an unsurveyed line: the findings of `dynocar survey`, and the error of the speed predicted for
+//! two trips on a line learned without them.
 
 use std::path::Path;
 
@@ -16,15 +16,15 @@ use super::Report;
 use super::bus_variants::{self, ByPower, OtherDay};
 use super::stop_masses::{self, StopMasses};
 
-/// Largest error in m/s in open loop on trips left out: over 60 s, over all of them, and the median
-/// of those from stop to stop.
+/// Largest open-loop error in m/s on trips left out, for the error over 60 s in all trips and for the median error from
+/// stop to stop.
 const ERROR_MAX_MPS: f64 = 0.30;
 /// Largest scatter in t of the mass from stop to stop, and its least correlation with the counted one.
 const STOP_MASS_T: f64 = 0.38;
 const CORRELATION: f64 = 0.9;
-/// Share of the error that is left when the gradient of a line declared level is found.
+/// Greatest share of the error that remains after the gradient of a line declared level is found.
 const LEVEL_SHARE_MAX: f64 = 0.25;
-/// Range of the inertial mass that independent analyses of the day leave open.
+/// Range of the inertial mass from independent analyses of the day.
 const INERTIAL_MASS_T: [f64; 2] = [19.4, 20.1];
 const PASSENGER_KG: [f64; 2] = [60.0, 82.0];
 const BRAKE_N_PER_PA: [f64; 2] = [0.23, 0.28];

@@ -1,5 +1,4 @@
-//! The bus's trips left out once more: mapped as another day's recordings, and with their force taken
-//! from power.
+//! Variants of the bus's trips left out: mapped as another day's recordings, and with the force computed from power.
 
 use std::path::Path;
 
@@ -11,14 +10,13 @@ use dynocar_model::train::PowerTrain;
 use dynocar_shared::SampleField;
 use dynocar_workshop::survey::survey_folder;
 
-/// By how much in m/s the error of mapped recordings, over all pairs of trips, may be greater than when
-/// they were surveyed with the others.
+/// Greatest increase in m/s of the error of recordings, over all pairs of trips, if they are mapped rather than
+/// surveyed with the others.
 const WORSE_MAX_MPS: f64 = 0.01;
-/// Range of the efficiency that a straight regression of the recorded force on power, without any balance of
-/// forces, leaves open.
+/// Range of the efficiency from a linear regression of the recorded force on power, without any balance of forces.
 const EFFICIENCY: [f64; 2] = [0.90, 0.96];
-/// Largest distance of force by power from force recorded, as a share of the recorded one: half as
-/// much again as such a regression leaves (8 %).
+/// Largest difference between the force computed from power and the recorded force, as a share of the latter: one and a
+/// half times the residual of such a regression (8 %).
 const APART_MAX: f64 = 0.12;
 
 /// Errors over 60 s in m/s of two trips: mapped as another day's, and surveyed with the others.
@@ -79,8 +77,8 @@ fn held_out_mps(dataset: &Dataset) -> Result<f64, String> {
     error.ok_or_else(|| "no trip is held out".into())
 }
 
-/// Maps the recordings of the trips held out on the line that was surveyed without them, as another
-/// day's recordings of the train that was learned, and compares what the line predicts of them.
+/// Maps the recordings of the trips held out on the line that was surveyed without them, as another day's recordings of
+/// the learned train, and compares their errors on that line.
 pub fn of_another_day(
     raw: &Path,
     surveyed: &Path,

@@ -16,7 +16,7 @@ const SHARE_MIN: f64 = 0.85;
 const PARAMETER_ERROR_MAX: f64 = 0.15;
 /// Smallest intersection over union of the windows of time.
 const IOU_MIN: f64 = 0.7;
-/// Parameters that are graded, with the value at which nothing acts.
+/// Graded parameters, with the value that means no effect.
 const GRADED: [(&str, f64); 4] =
     [("c_factor", 1.0), ("force_n", 0.0), ("wind_plus_mps", 0.0), ("k_n_per_kn_m", 600.0)];
 /// Datasets of other simulators, with the kinds that their verdict must name.

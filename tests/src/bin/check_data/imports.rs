@@ -1,5 +1,5 @@
-//! Files of other projects: every valid one is imported, every invalid one refused, and a train of
-//! railtoolkit's comes out as its own program has it.
+//! Files of other projects: every valid one is imported, every invalid one refused, and an imported train of
+//! railtoolkit has the figures of railtoolkit's own program.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use dynocar_analysis::import::{ImportReading, ImportSource, Imported, import};
 use super::Report;
 use super::trainruns::{THEIR_GRAVITY_MPS2, TRAINS};
 
-/// Largest relative difference from figures that were read off results.
+/// Largest relative difference from figures that were read from results.
 const TOLERANCE: f64 = 1e-6;
 
 /// Checks the files of `imports` and of `independent/trainruns`.

@@ -1,8 +1,7 @@
-//! Checks Dynocar against a folder of recorded and simulated data: every dataset loads, the
-//! resistance that `dynocar identify` finds is the true one where the truth is known, and the
-//! forward simulation comes out where other simulators do; what is undeclared in them is found,
-//! offline and live; a bus's line is surveyed and predicts trips that took no part in it; files of other
-//! projects are imported, and their invalid ones refused.
+//! Checks Dynocar against a folder of recorded and simulated data: every dataset loads; the resistance that `dynocar
+//! identify` finds is the true one where the truth is known; the forward simulation agrees with other simulators;
+//! undeclared effects are found, offline and live; a bus's line is surveyed and predicts trips that took no part in the
+//! survey; files of other projects are imported, and their invalid ones refused.
 //!
 //! `dynocar-check-data FOLDER`, with the folders `practice`, `practice-truth`, `independent`,
 //! `measured` and `imports` in it. Exit status 1 when a check fails.

@@ -14,9 +14,9 @@ use dynocar_shared::{PipelineKind, TrainId};
 use super::Report;
 use super::truth::Truth;
 
-/// A dragging brake must be suspected so soon after its onset.
+/// Greatest time in s from its onset until a dragging brake must be suspected.
 const NOTICED_MAX_S: f64 = 120.0;
-/// Tunnel drag must be suspected by the end of this passage.
+/// Number of the passage by whose end tunnel drag must be suspected.
 const PASSAGES_MAX: usize = 2;
 
 /// The suspect after each sample of the runs in their order.

@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::Report;
 
-/// Share of the driven speed range that counts as its thinly driven ends, at each end.
+/// Share of the driven speed range that counts as thinly driven, at each end.
 const THIN_END: f64 = 0.1;
 
 /// Checks every dataset whose true resistance is known, and one whose model lacks an effect.

@@ -11,9 +11,9 @@ use dynocar_shared::{
     Parameter, ParameterSnapshot, PipelineKind, SampleField, Status, TrainId, TrainSample,
 };
 
-/// A standstill of this many s is a stop.
+/// Least length in s of a standstill that is a stop.
 const STOP_S: f64 = 5.0;
-/// A section that moves for less than this in s shows little.
+/// Least time in s of motion in a section; a shorter motion shows little of the mass.
 const MOVING_MIN_S: f64 = 20.0;
 
 /// Learned and counted mass of one section, in t.

@@ -15,7 +15,7 @@ const MANIFEST: &str = "[dataset]\nname = \"stop\"\n[train]\nfile = \"train.toml
 const TRAIN: &str = "[train]\nmass_t = 240\nlength_m = 104\ncars = 4\nrotating_mass_factor = 0.08\n\
     [resistance]\na = 1.5\nb = 0.02\nc = 0.0008\n[brake]\nmax_force_kn = 200\n";
 
-/// The deceleration of the recorded stop, as an independent reading of the same data has it.
+/// Compares the deceleration of the recorded stop with an independent evaluation of the same data.
 pub fn check(report: &mut Report, folder: &Path) {
     let source = folder.join("measured/metra-highliner/runs/10-48.csv");
     report.note(&format!("{}: the stop is read", source.display()), decelerations(&source));

@@ -1,9 +1,9 @@
 //! Shortest running times by our driving simulation against those of railtoolkit's TrainRuns.jl.
 //!
-//! Their trains' resistance and inertia are not plain in their files; they were read off their own
-//! results (resistance force against speed, force against acceleration). Effort curves, speed
-//! limits and gradients come from the files. TrainRuns.jl steps 20 m at a time with explicit
-//! steps, so that the first seconds of an acceleration differ.
+//! The files do not state the resistance and inertia of their trains; both were derived from the results of
+//! TrainRuns.jl (resistance force against speed, force against acceleration). Effort curves, speed limits and gradients
+//! come from the files. TrainRuns.jl steps 20 m at a time with explicit steps, so that the first seconds of an
+//! acceleration differ.
 
 use std::path::Path;
 
@@ -21,7 +21,7 @@ pub const THEIR_GRAVITY_MPS2: f64 = 9.80665;
 const TOLERANCE: f64 = 0.005;
 const STEP_S: f64 = 0.05;
 
-/// A train of theirs, loaded to its limit.
+/// A train of TrainRuns.jl, loaded to its limit.
 pub struct TheirTrain {
     pub name: &'static str,
     pub length_m: f64,

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-/// The undeclared effects of a dataset and what knowing them is worth.
+/// The undeclared effects of a dataset, and the reduction of the error by a model that knows them.
 pub struct Truth {
     /// The right verdict.
     pub verdict: String,
@@ -21,7 +21,7 @@ impl Truth {
     ///
     /// # Errors
     ///
-    /// In words, when the file cannot be read or lacks something.
+    /// In words, when the file cannot be read or lacks an entry.
     pub fn read(folder: &Path, name: &str) -> Result<Truth, String> {
         let path = folder.join(format!("practice-truth/{name}.json"));
         let text = std::fs::read_to_string(&path)

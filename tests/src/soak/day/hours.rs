@@ -1,4 +1,4 @@
-//! The day in rows, an hour each.
+//! Results of the day as a table with a row for each hour.
 
 use std::fmt::Write;
 
@@ -7,13 +7,13 @@ use super::train::TrainAccount;
 /// Counts of an hour of the day.
 #[derive(Clone, Debug, Default)]
 pub struct Hour {
-    /// Resident memory of the daemon in KiB at its most.
+    /// Greatest resident memory of the daemon in KiB.
     pub resident_kib: u64,
     /// Samples published, once for each pipeline.
     pub offered: u64,
     /// Samples used, rejected and lost, over all pipelines.
     pub account: TrainAccount,
-    /// Median time from sample to snapshot in ns, 16 samples of each train on their way.
+    /// Median time in ns from sample to snapshot, with 16 samples of each train on their way.
     pub latency_p50_ns: u64,
     /// The time in ns that one in a thousand exceeds.
     pub latency_p999_ns: u64,

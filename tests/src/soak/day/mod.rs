@@ -1,8 +1,8 @@
-//! A day of eight trains in accelerated time: the whole default set of pipelines, samples at the
-//! trains' own stamps as fast as the daemon takes them, and trouble by the quarter of an hour.
+//! A day of eight trains in accelerated time: the whole default set of pipelines, samples with the trains' own stamps
+//! as fast as the daemon takes them, and a disturbance in each quarter of an hour.
 //!
 //! - [`train`]: one train with its controller and client
-//! - [`strange_host`]: the daemon's wall clock jumps, its disk fills
+//! - [`strange_host`]: a daemon whose wall clock jumps and whose disk fills
 //! - [`hours`]: the outcome of an hour
 
 pub mod hours;
@@ -26,7 +26,7 @@ use train::{DayTrain, TrainAccount};
 const SHIPPED: &str = include_str!("../../../../config/daemon.toml");
 /// Samples of a train that are on their way together.
 const BATCH: usize = 16;
-/// More samples than the daemon's buffers hold.
+/// Number of samples that exceeds the daemon's buffers.
 const FLOOD: usize = 700;
 const QUARTER_NS: i64 = 900_000_000_000;
 /// How far the wall clock is ahead in s, hour by hour.

@@ -1,4 +1,4 @@
-//! One train of the day: its simulated runs, one after the other, at its own stamps.
+//! One train of the day: its simulated runs, one after the other, with its own stamps.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -16,7 +16,7 @@ use crate::simulator::{Defects, EffectRequest, SimulatorSettings, TrainType, sim
 const RUNS: usize = 4;
 /// Time in ns between a run and the next.
 const TURN_NS: i64 = 60_000_000_000;
-/// How long it sleeps between two looks whether the daemon has followed.
+/// Pause between two checks whether the daemon has taken the samples.
 const PAUSE: Duration = Duration::from_micros(50);
 /// Undeclared effects on the trains, in turn.
 const EFFECTS: [EffectKind; 4] = [

@@ -27,7 +27,7 @@ const TRAIN: TrainId = TrainId(1);
 /// The first day, 2027-01-01, in s since 1970.
 const FIRST_DAY_S: u64 = 1_798_761_600;
 const DAY_S: u64 = 86_400;
-/// When the models are made that a life begins with.
+/// Time at which the first models of a life are made.
 const MADE: UtcSecond = UtcSecond { unix_s: FIRST_DAY_S };
 /// The learner looks at least so often, in days.
 const LEARNS_EVERY: usize = 7;
@@ -178,7 +178,7 @@ impl<'f> Life<'f> {
         }
     }
 
-    /// Writes what a recorder kept of a day.
+    /// Writes the recorded runs of a day.
     fn keep(&self, night: SystemTime, runs: Vec<crate::simulator::SimulatedRun>) {
         if runs.is_empty() {
             return;

@@ -1,8 +1,8 @@
 //! The rate at which a model that is no better is adopted, over hundreds of train years.
 //!
-//! For each of many simulated trains without an effect, some hundred trips are driven and predicted by
-//! the declared model and by rival models that are no better. Years are then made of these trips, drawn
-//! with replacement: what is measured is the judgement on scores as trips give them.
+//! For each of many simulated trains without an effect, some hundred trips are driven and predicted by the declared
+//! model and by rival models that are no better. Years are then made of these trips, drawn with replacement: this
+//! measures the judgement on realistic scores.
 
 use std::sync::Arc;
 
@@ -18,12 +18,12 @@ use crate::simulator::{EffectRequest, SimulatedWorld, SimulatorSettings, TrainTy
 const TRAIN: TrainId = TrainId(1);
 /// As in the configuration by default.
 const LEAST_GAIN: f64 = 0.1;
-/// Trips that are driven of each train.
+/// Number of simulated trips of each train.
 const DRIVEN: usize = 150;
 /// Trips of a year.
 const TRIPS_A_YEAR: usize = 10_000;
 
-/// Counts of mistakes.
+/// Counts of wrong adoptions.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MonthsMistakes {
     /// Years of all trains together.

@@ -1,9 +1,9 @@
 //! Months of one train in accelerated time: undeclared effects appear and go, and the loop of learning, trying,
 //! adopting and taking back has to follow.
 //!
-//! No processes and no clocks: the simulator drives the trips of each day; the models on trial and the
-//! residual monitor take every one of them, the learner what a recorder would have kept. A rule
-//! adopts. Everything follows from the seed.
+//! No processes and no clocks: the simulator drives the trips of each day; the models on trial and the residual monitor
+//! take every trip, the learner only the trips that a recorder would have kept. A rule adopts the models. Everything
+//! follows from the seed.
 //!
 //! - [`story`]: the undeclared effect of each day
 //! - [`life`]: the days

@@ -1,4 +1,4 @@
-//! Undeclared effects by day.
+//! The undeclared effects of each day.
 
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -10,7 +10,7 @@ use crate::simulator::{SimulatedWorld, TrueEffect};
 /// Story of a train over some months.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Story {
-    /// Nothing; two models that are no better are on trial.
+    /// No effect; two models that are no better are on trial.
     Nothing,
     /// From the onset on, one effect of a kind, as large as the simulator draws it.
     Appears(EffectKind),
@@ -22,7 +22,7 @@ pub enum Story {
     BrakeDrags,
 }
 
-/// When it begins and ends, in days from the first.
+/// Begin and end of a story, in days from the first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StorySpan {
     /// The first day on which something is undeclared.
@@ -105,7 +105,7 @@ impl Story {
             Story::Winter => drawn(world, EffectKind::BearingTemperature, &scene),
             Story::WheelsWear => {
                 let share = (day + 1 - span.onset) as f64 / (span.end - span.onset) as f64;
-                // A smaller wheel turns faster: what is measured is more than what is driven.
+                // A smaller wheel turns faster: the measured speed exceeds the driven one.
                 vec![TrueEffect::WheelDiameter { speed_scale: 1.0 + WEAR * share }]
             }
             Story::BrakeDrags => {

@@ -9,11 +9,11 @@ use super::story::LifeSettings;
 pub struct Adoption {
     /// The day.
     pub day: usize,
-    /// In force before.
+    /// Model in force before.
     pub before: ModelHash,
-    /// In force after.
+    /// Model in force after.
     pub after: ModelHash,
-    /// Whether it takes back the one before.
+    /// Whether it takes back the previous adoption.
     pub is_rollback: bool,
     /// Additions of the model in force after to its parent.
     pub adds: String,
@@ -24,7 +24,7 @@ pub struct Adoption {
 /// Outcome of one life.
 #[derive(Clone, Debug)]
 pub struct LifeOutcome {
-    /// How it was lived.
+    /// Settings of the life.
     pub settings: LifeSettings,
     /// Open-loop error over 60 s of the model in force, by day, in m/s.
     pub errors_mps: Vec<Option<f64>>,

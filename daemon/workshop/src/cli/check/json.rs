@@ -16,7 +16,7 @@ use crate::run_facts::recorded;
 use dynocar::cli::Failure;
 use dynocar::cli::check::{self as daemon, CheckAnswer};
 
-/// An object of these keys, in this order; after `..`, those of others, where they are there.
+/// Makes an object of these keys, in this order; after `..` stand optional objects whose keys are added.
 macro_rules! object {
     ($($key:ident: $value:expr,)* $(..$rest:ident: $more:expr,)*) => {{
         #[derive(Serialize)]
@@ -38,7 +38,7 @@ impl Serialize for CorrectionsAnswer<'_> {
     }
 }
 
-/// Returns the answer to what was understood.
+/// Returns the answer for the understood contents.
 pub(super) fn answer(path: &Path, understood: &Understood) -> impl Serialize {
     let errors: Vec<String> = understood.errors().map(ToString::to_string).collect();
     let first = understood.errors().next().cloned();

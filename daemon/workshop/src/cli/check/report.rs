@@ -216,7 +216,7 @@ fn tunnels(track: &Track) -> String {
     intervals(track.knows_tunnels(), lengths_m, &more)
 }
 
-/// Returns how many intervals there are, their length in all, and what more is to be said.
+/// Returns the number of intervals, their total length, and further remarks.
 fn intervals(is_known: bool, lengths_m: impl ExactSizeIterator<Item = f64>, more: &str) -> String {
     match (is_known, lengths_m.len()) {
         (false, _) => "not known".into(),

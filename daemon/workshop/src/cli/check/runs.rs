@@ -132,7 +132,7 @@ fn sources(runs: &[Read]) -> String {
 /// Properties with the numbers of the runs that share them.
 type Groups<T> = Vec<(T, Vec<String>)>;
 
-/// Puts a run's number to what holds for it.
+/// Adds a run's number to the group of the runs that share a property.
 fn put<T: PartialEq>(groups: &mut Groups<T>, what: T, number: String) {
     match groups.iter_mut().find(|(other, _)| *other == what) {
         Some((_, numbers)) => numbers.push(number),

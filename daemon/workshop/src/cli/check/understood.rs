@@ -35,7 +35,7 @@ impl Understood {
         Understood { kind, dataset: None, train: None, track: None, daemon: None }
     }
 
-    /// Returns the runs of a dataset, each or what is wrong with it.
+    /// Returns the runs of a dataset, or in place of a run its error.
     fn runs(&self) -> &[Result<Run, DatasetError>] {
         self.dataset.as_ref().map_or(&[], |(_, runs)| runs)
     }
@@ -56,7 +56,7 @@ impl Understood {
 ///
 /// # Errors
 ///
-/// An input failure for what has neither; a failure of the work where a drawing cannot be made or
+/// An input failure where neither a line nor a train is known; a failure of the work where a drawing cannot be made or
 /// written.
 pub(super) fn draw(understood: &Understood, folder: &Path) -> Result<(), Failure> {
     if understood.daemon.is_some() {

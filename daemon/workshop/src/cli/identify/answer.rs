@@ -8,13 +8,13 @@ use dynocar_model::units::Unit;
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
 use serde::Serialize;
 
-/// The parameter that a force scales.
+/// The parameter whose estimate scales with a force.
 const MASS: &str = "mass_t";
 /// Standard deviation of a load as a share of the declared mass.
 const LOAD_STD: f64 = 0.1;
-/// A mass that is further from the declared one is no load.
+/// Standard deviations between the estimated and the declared mass beyond which no load explains the difference.
 const DEVIATIONS_MAX: f64 = 3.0;
-/// Number of speeds, or a few more, at which the resistance is shown.
+/// Approximate greatest number of speeds at which the resistance is shown.
 const SHOWN_MAX: f64 = 7.0;
 
 /// Estimates of one estimator.
@@ -26,7 +26,7 @@ pub(super) struct EstimatorAnswer {
     pub values: BTreeMap<&'static str, f64>,
     pub std: BTreeMap<&'static str, f64>,
     pub resistance: Vec<ResistancePoint>,
-    /// At round speeds in the unit of the recording, for people.
+    /// The resistance at round speeds in the unit of the recording, for people.
     #[serde(skip)]
     pub resistance_shown: Vec<ResistancePoint>,
     pub samples: SampleCounts,
@@ -91,7 +91,7 @@ impl EstimatorAnswer {
         self.resistance_shown.clear();
     }
 
-    /// Adds what a force leaves open of the mass that is known up to this share.
+    /// Adds the relative uncertainty of a force to the standard deviation of the mass.
     pub(super) fn widen_mass(&mut self, share: f64) {
         let mass_t = self.values.get(MASS).copied().unwrap_or(0.0);
         if let Some(std) = self.std.get_mut(MASS) {

@@ -1,8 +1,7 @@
-//! Each run learned from alone, and how much the runs differ.
+//! Estimates from each run alone, and their differences between the runs.
 //!
-//! A parameter of the train is the same in every run: where the estimates of single runs scatter
-//! more than their intervals allow, something differs between the runs (a load, the weather), or the
-//! intervals leave something out.
+//! A parameter of the train is the same in every run: where the estimates of single runs scatter more than their
+//! intervals allow, something differs between the runs (a load, the weather), or the intervals lack a source of error.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -19,11 +19,11 @@ use crate::report::provenance::for_shell;
 use crate::run_facts::diagnostics;
 use dynocar::cli::text::{TextTable, entry};
 
-/// Returns the `train.toml`; what the file does not give and nobody says is a marked default.
+/// Returns the `train.toml`; a value that neither the file nor the command line gives is a marked default.
 ///
 /// # Errors
 ///
-/// A figure that no train has is an input failure.
+/// A value that is impossible for a train is an input failure.
 pub fn train(train: &ImportedTrain, arguments: &TrainArguments) -> Result<TrainText, Failure> {
     let from = |key: &str| origin(&train.account, key);
     let name = Value::String(train.name.clone());

@@ -18,13 +18,13 @@ use super::summary::DAEMON_FILE;
 use crate::cli::train_text::{ASKED, Asked, TrainArguments};
 use dynocar::models::text::TRAIN_FILE;
 
-/// The folder for the files where somebody who is asked says no other.
+/// The folder for the files where the user at the terminal gives no other.
 pub const FOLDER_DEFAULT: &str = "my_train";
 
 /// Describe your train and your CSV recordings as TOML files.
 ///
-/// It writes train.toml, daemon.toml and dataset.toml, which says of every column what it was taken for and
-/// why. Nothing is overwritten. On a terminal, without a folder, it asks for all that is not given.
+/// It writes train.toml, daemon.toml and dataset.toml, which states the assumed meaning of every column and the reason.
+/// Nothing is overwritten. On a terminal, without a folder, it asks for all that is not given.
 #[derive(Clone, Debug, Args)]
 pub struct InitArguments {
     /// The folder for the files; it is made where there is none
@@ -39,7 +39,7 @@ pub struct InitArguments {
     /// Take the rows of one train of files that hold several, by its cell in the column that names them
     #[arg(long = "train", value_name = "CELL", requires = "csv")]
     pub train_cell: Option<String>,
-    /// Say what a column holds, as speed=v_ist:km/h or time=Zeit:%d.%m.%Y %H:%M:%S; may be given several times
+    /// State the quantity of a column, as speed=v_ist:km/h or time=Zeit:%d.%m.%Y %H:%M:%S; may be given several times
     #[arg(long, value_name = "QUANTITY=COLUMN[:UNIT]", value_parser = given_column)]
     pub column: Vec<GivenColumn>,
     #[command(flatten)]
@@ -71,7 +71,7 @@ fn given_column(text: &str) -> Result<GivenColumn, String> {
     let names = || Quantity::ALL.map(Quantity::name).join(", ");
     let quantity = Quantity::from_name(name.trim())
         .ok_or_else(|| format!("'{name}' is no quantity; the quantities: {}", names()))?;
-    // A name may hold colons itself, and so may a format: what follows one counts where it is a unit or a format.
+    // Names and formats may hold colons, too: the text after a colon counts where it is a unit or a format.
     let said = |at: usize| {
         let (column, said) = (rest[..at].trim().to_owned(), rest[at + 1..].trim());
         let unit = Unit::find(quantity.dimension(), said);
@@ -91,7 +91,7 @@ fn given_column(text: &str) -> Result<GivenColumn, String> {
     Ok(GivenColumn { quantity, column: rest.trim().into(), unit: None, format: None })
 }
 
-/// Returns the arguments with what is asked for: everything that was not said, where not even the folder was.
+/// Returns the arguments, completed by questions at the terminal where not even the folder was given.
 ///
 /// # Errors
 ///

@@ -26,7 +26,7 @@ pub type NamedText = (String, String);
 ///
 /// # Errors
 ///
-/// When one cannot be read, or has another encoding than the others.
+/// When a file cannot be read, or has another encoding than the others.
 pub fn texts(
     paths: &[PathBuf],
     given: Option<&'static Encoding>,
@@ -214,8 +214,8 @@ pub fn from_folder(folder: &Path, files: &[PathBuf]) -> Result<Vec<String>, Fail
 pub struct Draft<'t> {
     /// Where they will be.
     pub folder: &'t Path,
-    /// Path of each as the dataset names it, its name in messages where that is not the path from the folder, and
-    /// what it will hold, or holds.
+    /// For each file: its path as the dataset names it, its name in messages where that is not the path from the
+    /// folder, and its present or future text.
     pub files: Vec<(&'t str, Option<&'t str>, &'t str)>,
 }
 

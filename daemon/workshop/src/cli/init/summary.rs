@@ -119,7 +119,7 @@ pub const DAEMON_FILE: &str = "daemon.toml";
 
 /// Understanding of the recordings.
 pub struct Described {
-    /// Which column was taken for what.
+    /// The assumed meaning of the columns.
     pub guess: Guess,
     /// The runs' files, as the dataset names them.
     pub files: Vec<String>,

@@ -19,7 +19,7 @@ use toml::Value;
 use crate::cli::train_text::comment;
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 
-/// Returns a name for a dataset: its folder's.
+/// Returns a name for a dataset: the name of its folder.
 pub fn name_of(folder: &Path) -> String {
     let full = std::path::absolute(folder).unwrap_or_else(|_| folder.into());
     let name = full.file_name().map(|name| name.to_string_lossy().into_owned());
@@ -171,7 +171,7 @@ fn quoted(text: &str) -> String {
 
 /// The daemon's configuration as shipped: the recommended set.
 const SHIPPED: &str = include_str!("../../../../../config/daemon.toml");
-/// Lines of the shipped configuration that are another train's, and what stands instead.
+/// Lines of the shipped configuration that belong to another train, and their replacements.
 const REPLACED: [(&str, &str); 5] = [
     (
         "# Dynocar's daemon: which trains it serves, and which estimators learn what.",

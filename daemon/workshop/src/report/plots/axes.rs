@@ -24,9 +24,9 @@ const BACKEND_FACTOR: f64 = 1.24;
 pub(super) struct Axis<'a> {
     pub range: [f64; 2],
     pub title: &'a str,
-    /// Labels at most.
+    /// Greatest number of labels.
     pub labels: usize,
-    /// Labels stand at whole numbers only.
+    /// True where labels stand at whole numbers only.
     pub is_whole: bool,
 }
 

@@ -14,7 +14,7 @@ const SIZE: (u32, u32) = (980, 380);
 const LETTER_PX: f64 = 7.0;
 /// Greatest speed in m/s drawn where the curves give none.
 const SPEED_MPS: f64 = 40.0;
-/// Points of the resistance.
+/// Number of points of the resistance curve.
 const POINTS: u32 = 100;
 
 /// A curve of (km/h, kN) with its name and colour.

@@ -2,7 +2,7 @@
 //!
 //! # Layout
 //!
-//! - [`picture`]: canvas and colours, a figure of the page, a file of its own
+//! - [`picture`]: canvas and colours, a figure of the page or a separate file
 //! - `axes`: axes, titles, text
 //! - [`reading`]: readings at a pointer
 //! - [`speeds`], [`series`], [`panel`], [`mod@line`], [`effort`]: the plots

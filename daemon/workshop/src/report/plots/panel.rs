@@ -17,7 +17,7 @@ use super::reading::PointerReading;
 
 /// Nominal size in px.
 const SIZE: (u32, u32) = (470, 290);
-/// Before and after stand so far apart, as share of the axis.
+/// Distance between the marks before and after, as a share of the axis.
 const APART: f64 = 0.004;
 
 /// Returns the panel as SVG.
@@ -65,7 +65,8 @@ pub fn draw(panel: &Panel, has_effect: bool) -> Result<Plot, PlotError> {
     Ok(Plot { svg, readings: vec![reading] })
 }
 
-/// Returns the panel with times of a run from its start where they count from 1970, and what they are then.
+/// Returns the panel; where times of a run count from 1970, it counts them from the run's start, and returns the new
+/// title.
 fn from_start(panel: &Panel) -> (Panel, Option<String>) {
     let mut panel = panel.clone();
     let first_s = panel.bins.first().map_or(0.0, |bin| bin.at);

@@ -1,4 +1,4 @@
-//! Ground of all plots: canvas, colours, the sizes of pages, figures.
+//! Base of all plots: canvas, colours, the sizes of pages, figures.
 //!
 //! Each plot is drawn at twice its nominal size, so that the whole pixels of the backend are fine
 //! enough, and scaled by the page. The colours are those of the light page; the page's style
@@ -16,18 +16,18 @@ use serde_json::json;
 use super::reading::{self, PointerReading};
 use crate::report::html::escape;
 
-/// Returns the name of the model without effects beside its data.
+/// Returns the name of the model without effects, as it stands beside its data.
 pub(super) fn before_name(has_effect: bool) -> &'static str {
     if has_effect { "before" } else { "model" }
 }
 
-/// Where charts are drawn.
+/// Area on which charts are drawn.
 pub(super) type Area<'t> = DrawingArea<SVGBackend<'t>, Shift>;
 
-/// Why something cannot be drawn.
+/// Error of the drawing backend.
 pub(super) type DrawError = DrawingAreaErrorKind<io::Error>;
 
-/// Why a plot cannot be drawn.
+/// Error of a plot that cannot be drawn.
 #[derive(Debug, thiserror::Error)]
 #[error("the plot of {plot} cannot be drawn: {source}")]
 pub struct PlotError {
@@ -37,7 +37,7 @@ pub struct PlotError {
     source: DrawError,
 }
 
-/// A plot: the picture, and what a pointer reads from it.
+/// A plot: the picture, and the values that a pointer reads from it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plot {
     /// The picture, for the page.
@@ -125,8 +125,8 @@ pub fn colour_rules() -> String {
     rules
 }
 
-/// Returns a picture of a nominal size in px for the page: it takes its size from the page, says what it shows, and
-/// where its charts lie; `paint` draws these and gives their frames.
+/// Returns a picture of a nominal size in px for the page: it takes its size from the page, and states its subject and
+/// the places of its charts; `paint` draws the charts and returns their frames.
 pub(super) fn picture(
     label: &str,
     class: &str,

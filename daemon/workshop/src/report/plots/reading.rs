@@ -1,10 +1,10 @@
-//! Pointer readings of a chart: the data behind the picture, no finer than the picture.
+//! Pointer readings of a chart: the data behind the picture, at the resolution of the picture.
 
 use serde_json::{Value, json};
 
-/// Steps that a picture resolves in the range of a quantity.
+/// Number of steps that a picture resolves in the range of a quantity.
 const STEPS: f64 = 2000.0;
-/// Columns that a picture resolves.
+/// Number of columns that a picture resolves.
 const COLUMNS: f64 = 1000.0;
 
 /// A quantity over a chart's horizontal axis.

@@ -21,9 +21,9 @@ const RUNS_SIZE: (u32, u32) = (470, 230);
 pub struct DailyErrors {
     /// Days since the first.
     pub day: f64,
-    /// Of the model that was declared.
+    /// Error of the declared model.
     pub declared_mps: Option<f64>,
-    /// Of the model in force on that day.
+    /// Error of the model in force on that day.
     pub in_force_mps: Option<f64>,
 }
 

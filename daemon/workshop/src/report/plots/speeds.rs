@@ -67,7 +67,7 @@ fn predicted(has_effect: bool) -> impl Iterator<Item = Predicted> {
     both.into_iter().take(1 + usize::from(has_effect))
 }
 
-/// Returns the run with its times from its start where they count from 1970, and what they are.
+/// Returns the run, with times from its start where they count from 1970, and the title of its time axis.
 fn from_start(trace: &Trace) -> (Trace, String) {
     let mut trace = trace.clone();
     let first_s = trace.pieces.iter().flatten().map(|point| point.time_s).reduce(f64::min);

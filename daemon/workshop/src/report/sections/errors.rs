@@ -1,4 +1,4 @@
-//! Error before and after, and the speeds behind it.
+//! Errors before and after the effect, and the speeds behind them.
 
 use dynocar_analysis::dataset::Role;
 use dynocar_analysis::explain::report::IntervalEstimate;
@@ -43,7 +43,8 @@ pub fn section(subject: &Subject) -> Result<PageSection, PlotError> {
     Ok(PageSection { id: "error", title: "Error before and after", body })
 }
 
-/// A row of the summary: the runs, their errors before and after, what is taken away; true for what judges.
+/// A row of the summary: the runs; their errors before and after, and the reduction; true for the row that judges the
+/// model.
 type SummaryRow = (String, [String; 3], bool);
 
 fn summary(subject: &Subject) -> String {

@@ -52,7 +52,7 @@ pub fn section(subject: &Subject) -> PageSection {
     PageSection { id: "quality", title: "Data quality", body }
 }
 
-/// A run, and what of it was used.
+/// A run and its used data.
 type UsedRun<'a> = (&'a Run, Option<&'a RunData>);
 
 fn runs_table(used: &[UsedRun]) -> String {

@@ -16,7 +16,7 @@ use super::picture::{
 };
 use panels::{Content, Panel};
 
-/// Nominal width in px of the letters of a stop's name, and of the gap to the next.
+/// Nominal width in px of a letter of a stop's name, and of the gap to the next name.
 const LETTER_PX: f64 = 7.0;
 const GAP_PX: f64 = 10.0;
 

@@ -1,4 +1,4 @@
-//! The properties of a line, declared and found: their data, their range, their readings at a pointer.
+//! The declared and the found properties of a line: their data, their range, their readings at a pointer.
 
 use dynocar_analysis::explain::report::panels::PanelBin;
 use dynocar_analysis::explain::report::residual_line::{AlongLine, MarkedInterval};
@@ -13,7 +13,7 @@ use crate::report::plots::panel::{reading, vertical_range};
 use crate::report::plots::picture::{ACTING, AFTER, DrawError};
 use crate::report::plots::reading::{PointerReading, thinned};
 
-/// Nominal height in px of a panel, of one that shows places only, and of a row of places more.
+/// Nominal height in px of a panel, of a panel that shows places only, and of each further row of places.
 const HEIGHT: u32 = 190;
 const PLACES_HEIGHT: u32 = 90;
 const ROW_HEIGHT: u32 = 26;
@@ -107,7 +107,8 @@ pub(super) fn direction_label(direction: f64) -> &'static str {
     if direction > 0.0 { "growing chainage" } else { "falling chainage" }
 }
 
-/// Returns the rows of a panel of places: what holds in all runs, or one row for each run.
+/// Returns the rows of a panel of places: one row for the places of all runs, and one for each run that has places of
+/// its own.
 pub(super) fn rows(sections: &[MarkedInterval]) -> Vec<Option<&str>> {
     let mut rows: Vec<Option<&str>> = sections.iter().map(|it| it.run.as_deref()).collect();
     rows.sort_unstable();
