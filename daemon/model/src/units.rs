@@ -1,6 +1,6 @@
 //! The units that quantities of files may have.
 //!
-//! Every unit converts to its dimension's base unit: SI, except °C for temperature, the unit of a sample.
+//! Every unit converts to its dimension's base unit, which is SI, except °C for temperature, the unit of a sample.
 
 /// Dimension of a unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
