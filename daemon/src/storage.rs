@@ -19,7 +19,7 @@ use rustix::fs::{CWD, RenameFlags, renameat_with};
 pub enum Rights {
     /// Its owner alone.
     Owner,
-    /// Every user that the process allows by default.
+    /// The users that the umask admits.
     Usual,
     /// The same as those of another file.
     Like(Permissions),

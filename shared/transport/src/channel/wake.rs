@@ -23,8 +23,8 @@ use crate::host::monotonic_now_ns;
 
 /// Pipeline threads that one controller can keep track of.
 const SLEEPERS_MAX: usize = 32;
-/// A new controller wakes threads without an announcement for this time, in ns; each thread announces itself more often
-/// than that.
+/// Time in ns for which a new controller wakes threads that have not announced themselves yet; each thread announces
+/// itself more often than that.
 const NEWCOMER_NS: i64 = 500_000_000;
 const LISTENERS_MAX: usize = 64;
 const NOTIFIERS_MAX: usize = 256;
