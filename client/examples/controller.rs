@@ -1,10 +1,10 @@
-//! A controller's cycle at 1 kHz: publish a sample, poll, use what the daemon learned, and fall
-//! back to the built-in parameters whenever that is not usable.
+//! A controller's cycle at 1 kHz: publish a sample, poll, use the learned parameters, and fall back to the built-in
+//! parameters whenever the learned ones are not usable.
 //!
 //! `cargo run --release -p dynocar-client --example controller -- [train id] [seconds]`
-//! reports on standard output whenever its resistance comes from another source. Ten seconds of coasting
-//! teach the daemon next to nothing: let `dynocar replay config/demo --rate 200` drive train 1 first,
-//! and this one drives on with the learned values.
+//! reports on standard output whenever its resistance comes from another source. Ten seconds of coasting teach the
+//! daemon next to nothing: let `dynocar replay config/demo --rate 200` drive train 1 first, and this example drives on
+//! with the learned values.
 
 use std::time::{Duration, Instant};
 
@@ -24,7 +24,7 @@ fn built_in_force_n(speed_mps: f64) -> f64 {
     (a + speed_mps * (b + speed_mps * c)) * MASS_KG * STANDARD_GRAVITY_MPS2 / 1000.0
 }
 
-/// Returns the resistance in N, where it comes from, and why.
+/// Returns the resistance in N, its source, and the reason for it.
 fn resistance(reader: &SnapshotReader, speed_mps: f64) -> (f64, [&'static str; 2]) {
     let answer = reader.resistance(monotonic_now_ns());
     if let Ok(reading) = &answer

@@ -1,9 +1,9 @@
-//! A driver on a simulated train: put your own controller in its place, and see what it gains.
+//! A driver on a simulated train: put your own controller in its place, and see how much it gains.
 //!
 //! `cargo run --release -p dynocar-client --example driver -- [train id] [legs]`
-//! drives that many legs of 6 km by the timetable, many times faster than real time, and says after each
-//! how late it came, how far beyond the stopping point it stands, and by which parameters it drove. With
-//! `dynocar run --config config/daemon.toml` beside it, it drives by what the daemon learns.
+//! drives that many legs of 6 km by the timetable, many times faster than real time, and reports after each how late it
+//! came, how far beyond the stopping point it stands, and by which parameters it drove. With `dynocar run --config
+//! config/daemon.toml` next to it, it drives by the parameters that the daemon learns.
 
 use std::time::Duration;
 
@@ -26,7 +26,7 @@ const SLEW_N_PER_S: f64 = 150e3;
 const ROTATING_MASS_FACTOR: f64 = 0.04;
 const BUILT_IN: Parameters =
     Parameters { mass_kg: 1_799_200.0, davis: [1.498, 0.0147, 0.00086], is_learned: false };
-/// Undeclared truth: another load, and more resistance.
+/// The undeclared truth: another load, and more resistance.
 const TRUTH: Parameters =
     Parameters { mass_kg: 2_050_000.0, davis: [2.1, 0.019, 0.00115], is_learned: false };
 

@@ -1,5 +1,5 @@
-//! Braking distance from the present speed, under what the daemon has learned of the rail, of the
-//! brake and of the resistance; with the built-in values where it has learned nothing usable.
+//! Braking distance from the present speed, with the adhesion, the brake and the resistance that the daemon has
+//! learned; where it has learned nothing usable, with the built-in values.
 //!
 //! `cargo run --release -p dynocar-client --example stopping -- [train id] [speed in m/s]`
 
@@ -19,7 +19,7 @@ const EFFORT: [EffortPoint; 2] = [
 ];
 const ASKED: [Quantity; 3] = [Quantity::Resistance, Quantity::BrakeFriction, Quantity::Adhesion];
 
-/// Returns the daemon's snapshot of a quantity if it may be used; reports its source.
+/// Returns the daemon's snapshot of a quantity if it may be used; prints its source.
 fn learned(reader: &SnapshotReader, quantity: Quantity) -> Option<&ParameterSnapshot> {
     let answer = reader.quantity(quantity, monotonic_now_ns());
     if let Ok(reading) = &answer

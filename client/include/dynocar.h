@@ -94,11 +94,11 @@ enum {
     DYNOCAR_ERROR_DOES_NOT_STOP = 13,
     /* The daemon's configuration lets no pipeline answer this quantity for the train */
     DYNOCAR_ERROR_NOT_PROVIDED = 14,
-    /* Every place of the train's channel is taken: close what is no longer needed */
+    /* Every place of the train's channel is taken: close the ends that are no longer needed */
     DYNOCAR_ERROR_NO_PLACE_LEFT = 15,
     /* The handle was opened before fork(), in the parent: its ends are the parent's */
     DYNOCAR_ERROR_FORKED_PROCESS = 16,
-    /* The root directory was removed or replaced: close what is open and open it again */
+    /* The root directory was removed or replaced: close all ends and open them again */
     DYNOCAR_ERROR_ROOT_GONE = 17,
     /* The daemon, or the controller, has a /dev/shm of its own: containers have to share one */
     DYNOCAR_ERROR_SEPARATE_MEMORY = 18
@@ -115,7 +115,7 @@ enum {
 /* How the estimate of a pipeline stands as a whole. Of an estimated one, too, the reason may
  * remark something. */
 enum {
-    /* Not all that is estimated is known yet; what is not is declared, kept or initial */
+    /* Some estimated values are not known yet; these are declared, kept or initial */
     DYNOCAR_STATUS_UNESTIMATED = 1,
     DYNOCAR_STATUS_ESTIMATED = 2, /* All that is estimated is known */
     DYNOCAR_STATUS_DEGRADED = 3, /* There are values, with a reservation named by the reason */
@@ -124,7 +124,7 @@ enum {
 
 /* Whether a controller may use the values for what it asked for, in one word. */
 enum {
-    /* The values may be used, whatever the status of the estimate as a whole */
+    /* The values may be used, independent of the status of the estimate as a whole */
     DYNOCAR_USE_USABLE = 1,
     DYNOCAR_USE_LEARNING = 2, /* Not known well enough yet */
     /* Known, and held back until it has held for a while without doubt */
@@ -261,7 +261,8 @@ enum {
     DYNOCAR_REJECTED_SPEED_JUMP = 7, /* The speed changed faster than a train can */
     /* The position disagrees with the speed or lies off the line */
     DYNOCAR_REJECTED_POSITION_JUMP = 8,
-    DYNOCAR_REJECTED_FORCE_OUT_OF_RANGE = 9, /* A force lies outside what the train can exert */
+    /* A force lies outside the range that the train can exert */
+    DYNOCAR_REJECTED_FORCE_OUT_OF_RANGE = 9,
     DYNOCAR_REJECTED_MASS_OUT_OF_RANGE = 10, /* The mass lies outside the train's range */
     DYNOCAR_REJECTED_BAD_DIRECTION = 11, /* The direction is neither +1 nor -1 */
     DYNOCAR_REJECTED_OUTLIER = 12, /* The estimator's outlier test refused the window */
@@ -466,8 +467,8 @@ typedef struct dynocar_parameter_snapshot {
      * the train's file, a zero byte and the line's file; 0 when it came from no files */
     uint64_t model_hash;
     /* One bit for each DYNOCAR_QUANTITY_... whose values a controller may use now. It changes
-     * seldom: what was usable stays so for half a second of doubt, and what was doubted has to
-     * hold for a while */
+     * seldom: a usable quantity stays usable for half a second of doubt, and a doubted one has
+     * to hold for a while */
     uint32_t usable_quantities;
     /* Where the mass comes from: DYNOCAR_MASS_SOURCE_... */
     uint32_t mass_source;
@@ -545,8 +546,8 @@ dynocar_code dynocar_reader_open(const char *root, uint64_t train_id, dynocar_re
 /* Sets the age (> 0) from which a snapshot counts as stale; 250 ms at first. REAL-TIME */
 dynocar_code dynocar_reader_set_stale_after_ns(dynocar_reader *reader, int64_t stale_after_ns);
 
-/* Takes what has come since the last poll: a bounded number of messages. news may be NULL; it
- * gets the number of snapshots that brought something new. REAL-TIME */
+/* Takes the messages since the last poll, a bounded number. news may be NULL; it gets the number of
+ * snapshots that brought something new. REAL-TIME */
 dynocar_code dynocar_reader_poll(dynocar_reader *reader, uint32_t *news);
 
 /* Copies the newest polled snapshot of the pipeline that answers a quantity (DYNOCAR_QUANTITY_...);
@@ -573,11 +574,11 @@ dynocar_code dynocar_reader_close(dynocar_reader *reader);
 
 /* ---- Reading a snapshot; no handle, any thread ---- */
 
-/* The state of use of what was asked for, DYNOCAR_USE_...; NULL is unavailable. REAL-TIME */
+/* The state of use of the request, DYNOCAR_USE_...; NULL is unavailable. REAL-TIME */
 uint32_t dynocar_reading_use_state(const dynocar_reading *reading);
 
-/* Why, in one word: the reason behind the status, or "confirming" for what is known and held back
- * until it has held for a while. Never NULL, never to be freed. REAL-TIME */
+/* The reason for it, in one word: the reason behind the status, or "confirming" for values that are
+ * known but held back until they have held for a while. Never NULL, never to be freed. REAL-TIME */
 const char *dynocar_reading_why(const dynocar_reading *reading);
 
 /* Resistance at a finite speed for a train of mass_kg (>= 0; 0 when only w0 is wanted).

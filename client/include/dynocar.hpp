@@ -163,7 +163,7 @@ class Reading {
   public:
     Reading(dynocar_code code, const dynocar_reading &raw) noexcept : code_(code), raw_(raw) {}
 
-    /* True while the values may be used, whatever the status of the estimate as a whole. */
+    /* True while the values may be used, independent of the status of the estimate as a whole. */
     bool is_usable() const noexcept { return code_ == DYNOCAR_OK && raw_.is_usable != 0; }
     explicit operator bool() const noexcept { return is_usable(); }
     /* The state of use: DYNOCAR_USE_..., and its name. */
@@ -173,9 +173,9 @@ class Reading {
                                    : std::uint32_t{DYNOCAR_USE_UNAVAILABLE};
     }
     const char *use_state_name() const noexcept { return dynocar_use_state_name(use_state()); }
-    /* Why, in one word: the reason behind the status ("none" only beside what is usable),
-     * "confirming" for what is known and held back, or "no_snapshot" or "not_provided". For what
-     * somebody reads. */
+    /* The reason for it, in one word: the reason behind the status ("none" only for usable values),
+     * "confirming" for values that are known but held back, or "no_snapshot" or "not_provided". For
+     * people to read. */
     const char *why() const noexcept
     {
         switch (code_) {
@@ -328,7 +328,7 @@ class Reader {
     {
         return dynocar_reader_set_stale_after_ns(handle_.get(), std::int64_t{age.count()});
     }
-    /* Takes what has come since the last poll. */
+    /* Takes the messages since the last poll. */
     dynocar_code poll() noexcept { return dynocar_reader_poll(handle_.get(), nullptr); }
 
     /* The newest polled knowledge of the pipeline that answers a quantity. now_ns: the host's

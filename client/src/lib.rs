@@ -25,13 +25,12 @@
 //! # Ok::<(), dynocar_client::ChannelError>(())
 //! ```
 //!
-//! Neither call ever waits for the daemon: publishing overwrites the oldest sample when nobody
-//! reads, polling takes what is there. A daemon that died shows as age, and the next one is
-//! read without reopening anything.
+//! Neither call ever waits for the daemon: publishing overwrites the oldest sample when nobody reads, polling takes the
+//! messages that are there. A daemon that died shows as age, and the next one is read without reopening anything.
 //!
 //! # Layout
 //!
-//! - [`publisher`], [`reader`]: the two ends a controller holds
+//! - [`publisher`], [`reader`]: the two ends that a controller holds
 //! - [`ffi`]: the same for C and C++
 //! - their common base is the package `dynocar-transport`
 

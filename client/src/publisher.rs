@@ -1,4 +1,4 @@
-//! The end a controller writes samples into.
+//! The end into which a controller writes samples.
 
 use std::time::{Duration, Instant};
 
@@ -12,17 +12,16 @@ use dynocar_transport::monotonic_now_ns;
 use dynocar_transport::peer::{Peer, RoleLock};
 use dynocar_transport::{ChannelError, SendRefused};
 
-/// How long a publisher that is closed waits for the pipelines to take what is on its way.
+/// Time for which a publisher that is closed waits for the pipelines to take the samples on their way.
 pub const CLOSE_PATIENCE: Duration = Duration::from_millis(200);
-/// How often it looks meanwhile.
+/// Time between two checks while it waits.
 const PAUSE: Duration = Duration::from_millis(1);
 
 /// Publishes one train's samples.
 ///
 /// One controller drives a train: while a publisher lives, a second one for the same train is
-/// refused. Sequence numbers go on from controller to controller. Dropping it waits for at most
-/// [`CLOSE_PATIENCE`], unless [`SamplePublisher::flush`] has waited already; what is given up the
-/// daemon counts as lost.
+/// refused. Sequence numbers go on from controller to controller. Dropping it waits for at most [`CLOSE_PATIENCE`],
+/// unless [`SamplePublisher::flush`] has waited already; the daemon counts samples that were not taken by then as lost.
 ///
 /// # Examples
 ///

@@ -1,4 +1,5 @@
-//! The end a controller polls snapshots from, and which pipeline answers which quantity, as they say.
+//! The end from which a controller polls snapshots, and the pipelines that answer the quantities, as the snapshots
+//! state them.
 
 use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::snapshot::PARAMETERS_MAX;
@@ -83,15 +84,15 @@ impl Reading<'_> {
         if self.is_stale { Status::Invalid } else { self.snapshot.status() }
     }
 
-    /// Returns why the status is what it is; `None` for a reason that a newer peer gives.
+    /// Returns the reason for the status; `None` for a reason that only a newer peer knows.
     pub fn reason(&self) -> Option<Reason> {
         if self.is_stale { Some(Reason::DaemonSilent) } else { self.snapshot.reason() }
     }
 
-    /// Returns whether a controller may use the values for what it asked for; else it falls back to its own
-    /// parameters. The daemon decides that, with hysteresis, so that a controller can switch on it: what
-    /// it promises, and how late it is, stands in `docs/guides/reading.md`. Of a pipeline that was asked
-    /// for by its kind, everything that it answers has to be usable.
+    /// Returns whether a controller may use the values for its request; else it falls back to its own parameters. The
+    /// daemon decides that, with hysteresis, so that a controller can switch on it: `docs/guides/reading.md` states the
+    /// promise behind it and its delay. Of a pipeline that was requested by its kind, all quantities that it answers
+    /// have to be usable.
     pub fn is_usable(&self) -> bool {
         let it = self.snapshot;
         let is_current = self.status() != Status::Invalid;
@@ -110,8 +111,8 @@ impl Reading<'_> {
         UseState::of(self.status(), self.is_usable())
     }
 
-    /// Returns why the state of use is what it is, in one word: the reason behind the status, or
-    /// `confirming` for what is known and held back. `none` stands only beside what is usable.
+    /// Returns the reason for the state of use, in one word: the reason behind the status, or `confirming` for values
+    /// that are known but held back. Only usable values have `none`.
     pub fn why(&self) -> &'static str {
         self.use_state().why(self.reason())
     }
@@ -144,8 +145,7 @@ impl SnapshotReader {
         self.stale_after_ns = stale_after_ns;
     }
 
-    /// Takes what has come since the last poll; gives the number of snapshots that brought
-    /// something new.
+    /// Takes the messages since the last poll; returns the number of snapshots that brought something new.
     ///
     /// # Real-time
     ///
@@ -259,8 +259,8 @@ impl SnapshotReader {
         Peer::look_up(&self.host, self.train, Role::Daemon)
     }
 
-    /// Returns true for what a daemon of ours may send: this train, numbers in range, nothing that is not
-    /// finite, nothing vouched for in the future, which would never grow old.
+    /// Returns true for a snapshot that a daemon of ours may send: of this train, with numbers in range, all finite,
+    /// and not vouched for in the future, since such a snapshot would never grow old.
     fn is_plausible(&self, it: &ParameterSnapshot) -> bool {
         let statistics = [
             it.innovation_normalised,
@@ -344,7 +344,7 @@ pub(crate) struct Answers {
 }
 
 impl Answers {
-    /// Takes in what a snapshot says; another daemon may have another configuration.
+    /// Takes in the quantities that a snapshot answers; another daemon may have another configuration.
     pub(crate) fn learn(&mut self, snapshot: &ParameterSnapshot) {
         if snapshot.epoch < self.epoch {
             return;

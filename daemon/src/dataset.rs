@@ -14,7 +14,7 @@ use dynocar_shared::TrainId;
 use crate::text_file::read_bytes;
 pub use crate::text_file::read_text;
 
-/// A path that leads to a dataset, and the train that is meant where a recording holds several.
+/// A path that leads to a dataset, and the selected train where a recording holds several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DatasetSource<'p> {
     /// The dataset's folder, its `dataset.toml`, or a recording.
@@ -172,7 +172,7 @@ fn described(folder: &Path) -> String {
     if names.is_empty() { String::new() } else { format!("; give {} itself", names.join(" or ")) }
 }
 
-/// Reads what a dataset declares, but no run.
+/// Reads the declarations of a dataset, but no run.
 ///
 /// # Errors
 ///

@@ -1,8 +1,8 @@
-//! The end of a long-running program: by request, or since its terminal is gone.
+//! The end of a long-running program: by request, or because its terminal is gone.
 //!
-//! A closed terminal sends SIGHUP to the programs in its foreground and nothing to others that write on
-//! it; for those the terminal itself is watched. Whoever starts a program with SIGHUP ignored, as `nohup`
-//! does, wants it to outlive its terminal, and it does.
+//! A closed terminal sends SIGHUP to the programs in its foreground and nothing to others that write to it; for those
+//! the terminal itself is watched. A program that is started with SIGHUP ignored, as by `nohup`, is meant to outlive
+//! its terminal, and it does.
 
 use std::io::{self, IsTerminal, stderr, stdin, stdout};
 use std::os::fd::{AsFd, OwnedFd};
@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
-/// Why a program cannot learn when to end.
+/// Why a program cannot be notified of its end.
 #[derive(Debug, thiserror::Error)]
 pub enum EndingError {
     /// The system takes no handler.

@@ -1,4 +1,4 @@
-//! The programs beside a controller: the daemon, its command line and its files.
+//! The programs next to a controller: the daemon, its command line and its files.
 //!
 //! # Layout
 //!
@@ -6,19 +6,19 @@
 //! - [`config`]: the daemon's configuration
 //! - [`dataset`]: recorded runs from disk
 //! - [`ending`]: when a long-running program ends
-//! - [`log`]: the daemon's log, for which nobody waits
+//! - [`log`]: the daemon's log, which nobody has to wait for
 //! - [`models`]: a store of models
 //! - [`observing`]: observation of trains, in one vocabulary
 //! - [`operator`]: texts for an operator, in one place
 //! - [`output`]: where results go
-//! - [`pipelines`]: the pipelines that a configuration asks for
+//! - [`pipelines`]: the pipelines of a configuration
 //! - [`programs`]: commands that are programs of their own, and their failures
-//! - [`demo`]: the main job as a show
-//! - [`redrawn`]: lines on a terminal that later ones are written over
+//! - [`demo`]: the main job as a demonstration
+//! - [`redrawn`]: lines on a terminal that later lines replace
 //! - [`run`]: the daemon, every stage on one screen
 //! - [`runtime`]: its threads
 //! - [`shadow`]: models on trial, and the change from one to another
-//! - [`stamp`]: moments whose age no wall clock changes
+//! - [`stamp`]: moments whose age does not depend on changes of the wall clock
 //! - [`state`]: estimates that outlive the daemon
 //! - [`storage`]: files that are replaced as a whole
 //! - [`supervision`]: health and metrics of the daemon, for supervisors and operators

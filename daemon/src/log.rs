@@ -1,7 +1,7 @@
 //! The daemon's log: lines in a bounded queue, which a thread of its own writes to standard error.
 //!
-//! Whoever reads the log may stand still, and a full pipe blocks who writes into it. So nobody but that
-//! thread writes: a line that finds the queue full is dropped, and the log says how many were.
+//! A reader of the log may stand still, and a full pipe blocks every writer. Therefore only that thread writes: a line
+//! that finds the queue full is dropped, and the log reports how many were.
 
 use std::io::{self, Write};
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use tracing_subscriber::fmt::MakeWriter;
 
 use crate::output::report_line;
 
-/// Lines that wait in every queue; what a daemon says in some minutes.
+/// Lines that fit into every queue: the log of some minutes.
 const LINES_MIN: usize = 1024;
 /// Stack of the thread that writes: it may be locked into memory.
 const STACK_BYTES: usize = 64 * 1024;

@@ -1,8 +1,8 @@
 //! Destinations of results: standard output, standard error and files, for every program of the project.
 //!
-//! A reader that has gone away ends the printing and nothing else; a full disk is an error in words.
-//! A file is written beside and takes its name once it is whole, so that whenever the program ends
-//! the old or the new one is there, never a part of one.
+//! A reader that has gone away ends the printing and nothing else; a full disk is an error in words. A file is written
+//! under another name and takes its own name once it is whole, so that even after an abrupt end of the program the old
+//! or the new file is there, never a part of one.
 
 use std::fs::{File, Metadata};
 use std::io::{self, ErrorKind, Read, Write};
@@ -55,8 +55,8 @@ pub fn print(text: &str) -> Result<(), OutputError> {
     }
 }
 
-/// Writes a line to standard error. What cannot be written there can be reported nowhere; nor what nobody
-/// takes from there for a second.
+/// Writes a line to standard error. A line that cannot be written there, or that nobody reads from there for a second,
+/// is lost: there is no other place to report it.
 pub fn report_line(line: &str) {
     let stderr = io::stderr();
     let second = Timespec { tv_sec: 1, tv_nsec: 0 };
@@ -195,8 +195,8 @@ pub fn write_in_folder(folder: &Path, name: &str, content: &str) -> Result<PathB
     Ok(path)
 }
 
-/// Writes files that are not there yet, all of them or none, into a folder, which is made when it
-/// is not there. What somebody else writes meanwhile stays.
+/// Writes files that are not there yet, all of them or none, into a folder, which is made when it is not there. Files
+/// that somebody else writes meanwhile stay.
 ///
 /// # Errors
 ///

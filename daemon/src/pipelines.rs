@@ -1,4 +1,4 @@
-//! The pipelines that a configuration asks for.
+//! The pipelines of a configuration.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Programs beside this one, which link libraries that a daemon does not need, and the failure of a command as JSON.
+//! Programs next to this one, which link libraries that a daemon does not need, and the failure of a command as JSON.
 
 use std::ffi::{OsStr, OsString};
 use std::io;
@@ -8,7 +8,7 @@ use std::process::Command;
 
 use serde::Serialize;
 
-/// The program of what is done away from the controller.
+/// The program for all work away from the controller.
 pub const WORKSHOP: &str = "dynocar-workshop";
 /// The program that records.
 pub const RECORDING: &str = "dynocar-recording";
@@ -20,13 +20,13 @@ pub const LIVE: &str = "dynocar-live";
 /// The program that measures this project, which calls others.
 const BENCH: &str = "dynocar-bench";
 
-/// All of them.
+/// All programs of the project.
 const PROGRAMS: [&str; 6] = [USUAL, WORKSHOP, RECORDING, WATCH, LIVE, BENCH];
 
-/// Name of the calling program that is usual.
+/// Name by which the user calls all of them.
 const USUAL: &str = "dynocar";
 
-/// Returns a call of a program that lies where this one lies; else the search path has it. It bears the name
+/// Returns a call of a program in the folder of this one, or else on the search path. It bears the name
 /// of the package that it is built from, with the ending of this one's: `dynocar-2` calls
 /// `dynocar-workshop-2`.
 pub fn call(package: &str) -> Command {

@@ -1,11 +1,11 @@
-//! Lines on a terminal that later ones are written over.
+//! Lines on a terminal that later lines replace.
 
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
 
 use rustix::termios::tcgetwinsize;
 
-/// Columns of a terminal that does not say how many it has.
+/// Columns of a terminal that does not report their number.
 const USUAL_COLUMNS: usize = 80;
 
 /// Returns whether the terminal takes letters beyond ASCII, by its locale.
@@ -16,7 +16,7 @@ pub fn is_utf8() -> bool {
     locale.contains("utf-8") || locale.contains("utf8")
 }
 
-/// Returns whether lines can be written over, and boxes and bars drawn: not on a terminal that is called dumb.
+/// Returns whether lines can be replaced, and boxes and bars drawn: not on a terminal of the type `dumb`.
 pub fn can_draw() -> bool {
     std::env::var("TERM").is_ok_and(|it| !it.is_empty() && it != "dumb") && is_utf8()
 }

@@ -339,8 +339,8 @@ fn work(plan: WorkerPlan, report_start: SyncSender<Result<(), ChannelError>>) {
     }
 }
 
-/// Gives the calling thread what its configuration asks for; what the system refuses is reported with
-/// its price, and the daemon goes on.
+/// Gives the calling thread its configured core and priority; a refusal of the system is reported with its cost, and
+/// the daemon goes on.
 fn prepare_thread(thread: &ThreadConfig) {
     let name = thread.name.as_str();
     if let Some(core) = thread.core

@@ -1,4 +1,4 @@
-//! Moments whose age is right in another process too, whatever happens to the clock on the wall.
+//! Moments whose age is right in another process too, even when the wall clock is set.
 
 use std::sync::LazyLock;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 
 /// A moment by both clocks of a host.
 ///
-/// Between two moments of one start of the system the clock that nobody sets counts; the wall clock counts only
-/// between moments of different starts.
+/// Between two moments of one start of the system the clock that nobody sets counts; between moments of different
+/// starts the wall clock counts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stamp {
     /// Seconds since 1970 by the wall clock.

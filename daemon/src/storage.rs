@@ -1,10 +1,9 @@
-//! Files that are replaced as a whole, whatever dies: a process, or the power.
+//! Files that are replaced as a whole, even when a process dies or the power fails.
 //!
-//! New content is written beside the old, brought to the disk, renamed over it, and the directory
-//! is brought to the disk. At every moment the name holds the old content or the new, never a
-//! part of one; when [`replace`] has returned, it holds the new for good. What must never be
-//! replaced, a file or a folder with files, takes its name in the same way, and only where the name
-//! is free: [`write_once`], [`make_once`].
+//! New content is written into another file, brought to the disk and renamed over the old file, and the directory is
+//! brought to the disk. At every moment the name holds the old content or the new, never a part of one; when
+//! [`replace`] has returned, it holds the new for good. A file, or a folder with files, that must never be replaced
+//! takes its name in the same way, but only where the name is free: [`write_once`], [`make_once`].
 
 use std::fs::{File, OpenOptions, Permissions};
 use std::io::{self, ErrorKind, Write};
@@ -20,7 +19,7 @@ use rustix::fs::{CWD, RenameFlags, renameat_with};
 pub enum Rights {
     /// Its owner alone.
     Owner,
-    /// Whoever the user lets by default.
+    /// The users that the umask admits.
     Usual,
     /// The same as those of another file.
     Like(Permissions),
@@ -35,8 +34,8 @@ pub trait Storage {
     /// The system's answer; a file that was made and not written is removed.
     fn write_new(&self, path: &Path, content: &[u8], rights: &Rights) -> io::Result<()>;
 
-    /// Makes a file that was not there and is to grow: what is written to it is brought to the disk by
-    /// [`Storage::sync_file`], its name by [`Storage::sync_directory`].
+    /// Makes a file that was not there and is to grow: [`Storage::sync_file`] brings its content to the disk,
+    /// [`Storage::sync_directory`] its name.
     ///
     /// # Errors
     ///
@@ -120,7 +119,7 @@ impl Storage for Disk {
         Ok(Box::new(File::create_new(path)?))
     }
 
-    // The system brings to the disk what was written by any handle of the file.
+    // The system brings to the disk the data written by any handle of the file.
     fn sync_file(&self, path: &Path) -> io::Result<()> {
         File::open(path)?.sync_data()
     }

@@ -1,4 +1,4 @@
-//! Text files from disk, whatever lies in their place.
+//! Text files from disk, with an error for everything else at their path.
 
 use std::fs::{File, FileType};
 use std::io::{ErrorKind, Read};
@@ -26,7 +26,7 @@ fn irregular(kind: FileType) -> Option<&'static str> {
     kinds.into_iter().find(|(is_it, _)| *is_it).map(|(_, name)| name)
 }
 
-/// Returns the format of a file that begins so and is no text in the encoding; `None` for what may be.
+/// Returns the format of a file whose first bytes are not text in the encoding; `None` for possible text.
 fn other_format(head: &[u8], encoding: &'static Encoding) -> Option<&'static str> {
     if [UTF_16LE, UTF_16BE].contains(&encoding) {
         return None;
@@ -72,7 +72,7 @@ fn unreadable(error: std::io::Error) -> FileProblem {
     }
 }
 
-/// Refuses what is no file of a size that can be read, before it is opened: opening a pipe may wait for
+/// Refuses, before it is opened, a path that is not a file of a size that can be read: opening a pipe may wait for
 /// ever.
 ///
 /// # Errors

@@ -1,9 +1,9 @@
 //! Descriptions of the bytes of shared-memory types.
 //!
-//! [`wire_struct!`](crate::wire_struct) declares a `#[repr(C)]` struct, refuses padding at compile time, and gives
-//! the struct a `LAYOUT` (name, type, offset and size of each field) and a `LAYOUT_HASH` over
-//! it; what each field means, and its words by its place, serve whoever writes the struct down. Two peers whose hashes differ never exchange a byte: the hash is part of the type name
-//! that the channel compares before it maps anything.
+//! [`wire_struct!`](crate::wire_struct) declares a `#[repr(C)]` struct, refuses padding at compile time, and gives the
+//! struct a `LAYOUT` (name, type, offset and size of each field) and a `LAYOUT_HASH` over it, and, for programs that
+//! write the struct down, the meanings of the fields and access to their words by index. Two peers whose hashes differ
+//! never exchange a byte: the hash is part of the type name that the channel compares before it maps anything.
 
 /// One field of a shared-memory type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,9 +22,9 @@ pub struct FieldLayout {
 ///
 /// A float's word holds its bits, an integer's its value, negative ones in two's complement.
 pub trait Words {
-    /// Returns how many words.
+    /// Returns the number of words.
     fn count(&self) -> usize;
-    /// Returns a word by its place.
+    /// Returns a word by its index.
     ///
     /// # Panics
     ///

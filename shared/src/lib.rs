@@ -1,8 +1,8 @@
 //! The contract between a train controller and the Dynocar daemon, and nothing else.
 //!
-//! The crate knows bytes: which fields cross the shared memory, in which units, at which
-//! offsets, under which service names. It allocates nothing, depends on nothing, and holds
-//! no estimator, so that it may be linked into a controller.
+//! The crate knows bytes: which fields cross the shared memory, in which units, at which offsets, under which service
+//! names. It allocates nothing, depends on no other crate, and holds no estimator, so that it may be linked into a
+//! controller.
 //!
 //! # Layout
 //!

@@ -1,4 +1,4 @@
-//! Resistance at a speed, straight from a snapshot.
+//! Resistance at a speed, computed from a snapshot.
 
 use crate::snapshot::ParameterSnapshot;
 use crate::vocabulary::Parameter;

@@ -17,8 +17,8 @@ impl core::fmt::Display for TrainId {
 /// Bit in [`TrainSample::flags`]: the controller's own wheel-slide protection is active.
 pub const FLAG_WHEEL_SLIDE: u8 = 1;
 
-/// Lists every measured quantity once: what it is, its name as a member and as a field, and between which values
-/// it lies whatever the train.
+/// Lists every measured quantity once: its documentation, its name as a member and as a field, and the range in which
+/// it lies for every train.
 macro_rules! measured {
     ($( $(#[doc = $doc:literal])* $item:ident = $field:ident [$low:expr, $high:expr]; )*) => {
         /// A measured quantity of a [`TrainSample`], with its bit in [`TrainSample::valid`].

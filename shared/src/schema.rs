@@ -1,5 +1,5 @@
-//! Fields of a sample and a snapshot: the one table from which recordings, the page of their fields and all others
-//! that write them under names are made.
+//! Fields of a sample and a snapshot: the only table from which recordings, the page of their fields and every other
+//! named representation of them are made.
 //!
 //! Names, types and meanings are those of the structs; the units are those in the names.
 
@@ -11,11 +11,11 @@ use crate::vocabulary::Parameter;
 /// When a field has no value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Missing {
-    /// It always has one.
+    /// The field always has a value.
     Never,
     /// Unless the bit of this quantity is set in [`TrainSample::valid`].
     Unless(SampleField),
-    /// In what is written down: each entry says it by being there.
+    /// In every written form: the presence of the other fields shows its value.
     SaidByOthers,
 }
 

@@ -9,8 +9,8 @@ pub const SCHEMA_MAJOR: u32 = 1;
 /// The iceoryx2 release whose shared-memory layout the channels use.
 pub const TRANSPORT_VERSION: &str = "0.10.0";
 
-/// Prefix of every shared-memory file, own to product and transport version, so that another
-/// iceoryx2 release never meets our segments.
+/// Prefix of every shared-memory file. It belongs to this product and transport version alone, so that another iceoryx2
+/// release never meets our segments.
 pub const SEGMENT_PREFIX: &str = "dynocar_0_10_0_";
 
 /// Samples a pipeline thread may fall behind before the oldest are overwritten.

@@ -102,8 +102,8 @@ wire_struct! {
         /// The model of train and line that the pipeline uses: the first 8 bytes of SHA-256
         /// over the train's file, a zero byte and the line's file; 0 when it came from no files.
         pub model_hash: u64,
-        /// One bit for each [`Quantity`] whose values a controller may use now. It changes seldom: what
-        /// was usable stays so for half a second of doubt, and what was doubted has to hold for a while.
+        /// One bit for each [`Quantity`] whose values a controller may use now. It changes seldom: a usable quantity
+        /// stays usable for half a second of doubt, and a doubted one has to hold for a while.
         pub usable_quantities: u32,
         /// Where the mass comes from: [`crate::vocabulary::MassSource`] by number.
         pub mass_source: u32,
@@ -165,7 +165,7 @@ impl ParameterSnapshot {
         }
     }
 
-    /// Returns why the status is what it is.
+    /// Returns the reason for the status.
     pub const fn reason(&self) -> Option<Reason> {
         Reason::from_number(self.reason)
     }

@@ -24,7 +24,7 @@ pub struct EffortPoint {
     pub force_n: f64,
 }
 
-/// How the brake comes after its command. All zero: in full, at once.
+/// Response of the brake to its command. All zero: full force, at once.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BrakeResponse {
     /// Time in s after the command until traction is cut off; it holds the speed till then.
@@ -75,11 +75,11 @@ pub enum RailAdhesion {
 }
 
 impl RailAdhesion {
-    /// Returns the rail of a snapshot that gives `adhesion`; of a lower bound, and without a speed, none.
+    /// Returns the rail of a snapshot that gives `adhesion`; `None` for a lower bound, and without a speed.
     ///
-    /// The coefficient is that of the speed at which the braking was last seen, which is its lowest, and a
-    /// rail carries less at higher speeds. So it is taken along the wet law, the steeper of the two: a
-    /// stop from a higher speed is not computed with what the rail carried at the end of the last one.
+    /// The coefficient is that of the last speed at which the braking was seen, the lowest one, and a rail carries less
+    /// at higher speeds. Therefore it is extended along the wet law, the steeper of the two: a stop from a higher speed
+    /// is not computed with the adhesion at the end of the last one.
     pub fn learned(snapshot: &ParameterSnapshot) -> Option<Self> {
         let value = snapshot.value(Parameter::Adhesion)?;
         let std = snapshot.std(Parameter::Adhesion)?;

@@ -167,9 +167,9 @@ vocabulary! {
 }
 
 vocabulary! {
-    /// How the estimate of a pipeline stands as a whole; what of it may be used says the state of use.
+    /// State of the estimate of a pipeline as a whole; the state of use says which of its values may be used.
     Status: u32 {
-        /// Not all that is estimated is known yet; what is not is declared, kept or initial.
+        /// Some estimated values are not known yet; these are declared, kept or initial.
         Unestimated = 1 "unestimated",
         /// All that is estimated is known.
         Estimated = 2 "estimated",
@@ -181,7 +181,7 @@ vocabulary! {
 }
 
 vocabulary! {
-    /// Why a status is what it is. The number 10 meant something once and stays unused.
+    /// Reason for a status. The number 10 had a meaning once and stays unused.
     Reason: u32 {
         /// Nothing to remark.
         None = 0 "none",
@@ -247,7 +247,7 @@ vocabulary! {
         SpeedJump = 7 "speed_jump",
         /// The position disagrees with the speed or lies off the line.
         PositionJump = 8 "position_jump",
-        /// A force lies outside what the train can exert.
+        /// A force lies outside the range that the train can exert.
         ForceOutOfRange = 9 "force_out_of_range",
         /// The mass lies outside the train's range.
         MassOutOfRange = 10 "mass_out_of_range",

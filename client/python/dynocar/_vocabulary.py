@@ -36,9 +36,9 @@ class Code(_Vocabulary):
     PANIC = 12  # A fault inside the library, in words on standard error: close the handle
     DOES_NOT_STOP = 13  # The train does not slow down, at the values given or at the edge of the bound
     NOT_PROVIDED = 14  # The daemon's configuration lets no pipeline answer this quantity for the train
-    NO_PLACE_LEFT = 15  # Every place of the train's channel is taken: close what is no longer needed
+    NO_PLACE_LEFT = 15  # Every place of the train's channel is taken: close the ends that are no longer needed
     FORKED_PROCESS = 16  # The handle was opened before fork(), in the parent: its ends are the parent's
-    ROOT_GONE = 17  # The root directory was removed or replaced: close what is open and open it again
+    ROOT_GONE = 17  # The root directory was removed or replaced: close all ends and open them again
     SEPARATE_MEMORY = 18  # The daemon, or the controller, has a /dev/shm of its own: containers have to share one
 
 
@@ -65,7 +65,7 @@ class Status(_Vocabulary):
     ``docs/guides/reading.md`` says what each status and each reason means.
     """
 
-    UNESTIMATED = 1  # Not all that is estimated is known yet; what is not is declared, kept or initial
+    UNESTIMATED = 1  # Some estimated values are not known yet; these are declared, kept or initial
     ESTIMATED = 2  # All that is estimated is known
     DEGRADED = 3  # There are values, with a reservation named by the reason
     INVALID = 4  # The values must not be used
@@ -74,7 +74,7 @@ class Status(_Vocabulary):
 class UseState(_Vocabulary):
     """Whether a controller may use the values for what it asked for, in one word."""
 
-    USABLE = 1  # The values may be used, whatever the status of the estimate as a whole
+    USABLE = 1  # The values may be used, independent of the status of the estimate as a whole
     LEARNING = 2  # Not known well enough yet
     CONFIRMING = 3  # Known, and held back until it has held for a while without doubt
     DOUBTED = 4  # Something speaks against the values or the samples
@@ -180,7 +180,7 @@ class RejectionReason(_Vocabulary):
     SPEED_OUT_OF_RANGE = 6  # The speed lies outside the train's range
     SPEED_JUMP = 7  # The speed changed faster than a train can
     POSITION_JUMP = 8  # The position disagrees with the speed or lies off the line
-    FORCE_OUT_OF_RANGE = 9  # A force lies outside what the train can exert
+    FORCE_OUT_OF_RANGE = 9  # A force lies outside the range that the train can exert
     MASS_OUT_OF_RANGE = 10  # The mass lies outside the train's range
     BAD_DIRECTION = 11  # The direction is neither +1 nor -1
     OUTLIER = 12  # The estimator's outlier test refused the window

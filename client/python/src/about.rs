@@ -1,4 +1,5 @@
-//! Clock, versions, who serves a train, the words of answers, and the vocabularies by which the tests hold those in Python.
+//! Clock, versions, who serves a train, the words of answers, and the vocabularies against which the tests check those
+//! in Python.
 
 use std::fmt::Debug;
 use std::path::PathBuf;

@@ -14,14 +14,14 @@ use pyo3::call::PyCallArgs;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
-/// How often signals are looked for.
+/// Time between two checks for signals.
 pub(crate) const SIGNALS_EVERY: Duration = Duration::from_millis(50);
 
-/// Given the share done, 0 to 1, and what is being done.
+/// Called with the share done, 0 to 1, and the name of the present step.
 pub(crate) type Progress<'p> = &'p (dyn Fn(f64, &str) + Sync);
 
-/// Does the work in a thread of its own and calls `progress` with its steps. When a signal or
-/// `progress` raises, that is what the caller gets at once, and the work ends at its next step.
+/// Does the work in a thread of its own and calls `progress` with its steps. When a signal or `progress` raises, the
+/// caller gets that exception at once, and the work ends at its next step.
 pub(crate) fn in_background<T: Send + 'static>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,

@@ -1,9 +1,8 @@
 //! Ends of channels, each kept in the thread that opened it.
 //!
-//! The transport's ports belong to one thread, and Python hands its objects from thread to thread. So an
-//! object holds a number only, under which the end lies in a list of its own thread. Another thread that
-//! uses the object is refused; one that drops it leaves the end to its own thread, which closes it when it
-//! opens the next one or ends.
+//! The transport's ports belong to one thread, and Python hands its objects from thread to thread. Therefore an object
+//! holds only a number, under which the end lies in a list of its own thread. Another thread that uses the object is
+//! refused; one that drops it leaves the end to its own thread, which closes it when it opens the next one or ends.
 
 use std::cell::RefCell;
 use std::collections::HashMap;

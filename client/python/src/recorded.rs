@@ -53,7 +53,7 @@ pub(crate) fn check(py: Python<'_>, path: PathBuf, train: Option<u64>) -> PyResu
     answer.map_err(|failure: Failure| of_failure(py, &failure))
 }
 
-/// Returns a dataset: what `check` says of it, and the tables of its runs and of all of them.
+/// Returns a dataset: the answer of `check`, and the tables of its runs and of all of them.
 #[pyfunction]
 pub(crate) fn read(
     py: Python<'_>,

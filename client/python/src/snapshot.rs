@@ -9,7 +9,7 @@ use pyo3::types::{PyBytes, PyList};
 
 use crate::calls::of_code;
 
-/// A snapshot with its age, or the code that says why there is none.
+/// A snapshot with its age, or the code that tells why there is no snapshot.
 #[pyclass(frozen, module = "dynocar._native")]
 pub(crate) struct Reading {
     pub(crate) code: Code,
@@ -53,7 +53,7 @@ impl Reading {
         self.copy.use_state() as u32
     }
 
-    /// Returns why the state of use is what it is.
+    /// Returns the reason for the state of use.
     #[getter]
     fn why(&self) -> &'static str {
         self.copy.why()

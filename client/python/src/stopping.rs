@@ -1,4 +1,4 @@
-//! Braking distance and time: the law of `dynocar_shared::stopping`, as C has it.
+//! Braking distance and time: the law of `dynocar_shared::stopping`, with the arguments of the C interface.
 
 use dynocar_client::ffi::StopRequest;
 use dynocar_shared::stopping::EffortPoint;
@@ -6,7 +6,8 @@ use pyo3::prelude::*;
 
 use crate::calls::of_code;
 
-/// Distance, time, and both with the confidence. `numbers` are those of `dynocar_stop` in `dynocar.h` before `rail`.
+/// Returns distance, time, and both with the confidence. `numbers` are the members of `dynocar_stop` in `dynocar.h`
+/// before `rail`.
 #[pyfunction]
 pub(crate) fn stopping_estimate(
     py: Python<'_>,

@@ -16,9 +16,9 @@ const RUN: &str = "run";
 
 /// Named columns of one length, NaN where a value is missing.
 pub(crate) type Columns = Vec<(String, Vec<f64>)>;
-/// A batch for a pickle: the run's number, and the bytes of its columns.
+/// A batch in a pickle: the run's number, and the bytes of its columns.
 type Kept<B> = (Option<u32>, Vec<(String, B)>);
-/// The one argument by which a table is made again.
+/// The only argument from which a table is made again.
 type KeptBatches<'py> = (Vec<Kept<Bound<'py, PyBytes>>>,);
 
 /// A column of numbers, which NumPy takes by `numpy.asarray`.
@@ -160,7 +160,7 @@ fn quantities(run: &Run, fields: &[SampleField], known: &[(Quantity, &'static st
     columns
 }
 
-/// Columns in Arrow's form: what is missing is null there, and NaN in the memory that NumPy sees.
+/// Columns in Arrow's form: a missing value is null there, and NaN in the memory that NumPy sees.
 fn batch(run: Option<u32>, columns: Columns) -> PyResult<RecordBatch> {
     let rows = columns.first().map_or(0, |(_, values)| values.len());
     let number =

@@ -1,4 +1,4 @@
-//! Codes, messages, and the wall that panics do not pass.
+//! Codes, messages, and the barrier that panics do not pass.
 
 use std::ffi::{CStr, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -6,7 +6,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use crate::reader::NoAnswer;
 use dynocar_transport::{ChannelError, SendRefused};
 
-/// Declares the codes with their numbers and texts, so that none is without a text.
+/// Declares the codes with their numbers and texts, so that every code has a text.
 macro_rules! codes {
     ($( $(#[doc = $doc:literal])* $code:ident = $number:literal $text:literal ),* $(,)?) => {
         /// Result codes of every function that can fail; `DYNOCAR_ERROR_…` in C.
@@ -67,11 +67,11 @@ codes! {
     DoesNotStop = 13 c"the train does not slow down",
     /// The daemon's configuration lets no pipeline answer this quantity for the train.
     NotProvided = 14 c"no pipeline answers this quantity for the train",
-    /// Every place of the train's channel is taken: close what is no longer needed.
+    /// Every place of the train's channel is taken: close the ends that are no longer needed.
     NoPlaceLeft = 15 c"all places of the train's channel are taken",
     /// The handle was opened before `fork()`, in the parent: its ends are the parent's.
     ForkedProcess = 16 c"the handle was opened by the process that forked this one",
-    /// The root directory was removed or replaced: close what is open and open it again.
+    /// The root directory was removed or replaced: close all ends and open them again.
     RootGone = 17 c"the root directory was removed or replaced",
     /// The daemon, or the controller, has a `/dev/shm` of its own: containers have to share one.
     SeparateMemory = 18 c"the other side has a /dev/shm of its own",

@@ -1,8 +1,7 @@
 //! Target of a `dynocar_publisher *` or a `dynocar_reader *`.
 //!
-//! The transport's ports belong to the thread that opened them. Rust holds a controller to that
-//! at compile time; here every call compares the thread, and the process where one has forked, so that
-//! a mistake is a code instead of a data race.
+//! The transport's ports belong to the thread that opened them. Rust enforces that at compile time; here every call
+//! compares the thread, and the process where one has forked, so that a mistake is a code instead of a data race.
 
 use super::error::{Code, Failure};
 use dynocar_transport::ChannelError;

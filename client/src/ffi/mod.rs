@@ -1,4 +1,4 @@
-//! The C interface: what C and C++ controllers link, declared in `include/dynocar.h`.
+//! The C interface: the functions that C and C++ controllers link, declared in `include/dynocar.h`.
 //!
 //! Thin on purpose: each function checks its pointers, calls the Rust end that a Rust controller
 //! uses, and gives a [`Code`]. No panic crosses the boundary ([`error`]), and a handle used by
@@ -6,16 +6,16 @@
 //!
 //! # Layout
 //!
-//! - [`error`]: codes, messages, and the wall that panics do not pass
+//! - [`error`]: codes, messages, and the barrier that panics do not pass
 //! - [`handle`]: the target of a `dynocar_publisher *` or a `dynocar_reader *`
 //! - [`publisher`], [`reader`]: the two ends a controller holds
-//! - [`snapshot`]: resistance, parameters and covariances out of a copied snapshot
+//! - [`snapshot`]: resistance, parameters and covariances from a copied snapshot
 //! - [`stopping`]: braking distance and time with a bound
 //! - [`about`]: clock, versions, who serves a train, and the vocabularies' names
 //!
 //! # Safety
 //!
-//! All functions here share these conditions, and add none of their own:
+//! All functions here have these conditions and no others:
 //!
 //! - a pointer is NULL or points to a readable (`const`) or writable object of its type, aligned,
 //!   that nobody else touches during the call;

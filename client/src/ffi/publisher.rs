@@ -1,4 +1,4 @@
-//! The end a C controller writes samples into.
+//! The end into which a C controller writes samples.
 
 use std::ffi::c_char;
 use std::time::Duration;

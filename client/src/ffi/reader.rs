@@ -1,4 +1,4 @@
-//! The end a C controller polls snapshots from.
+//! The end from which a C controller polls snapshots.
 
 use std::ffi::c_char;
 
@@ -61,13 +61,13 @@ impl From<Reading<'_>> for ReadingCopy {
 }
 
 impl ReadingCopy {
-    /// The state of use of what was asked for; a status of a newer peer reads as invalid.
+    /// Returns the state of use of the request; a status of a newer peer reads as invalid.
     pub fn use_state(&self) -> UseState {
         let status = Status::from_number(self.status).unwrap_or(Status::Invalid);
         UseState::of(status, self.is_usable != 0)
     }
 
-    /// Why that is so, see [`Reading::why`].
+    /// Returns the reason for that state, see [`Reading::why`].
     pub fn why(&self) -> &'static str {
         self.use_state().why(Reason::from_number(self.reason))
     }
@@ -88,7 +88,7 @@ pub unsafe extern "C" fn dynocar_reading_use_state(reading: *const ReadingCopy) 
     unsafe { reading.as_ref() }.map_or(UseState::Unavailable, ReadingCopy::use_state) as u32
 }
 
-/// Why the state of use is what it is, see [`Reading::why`]. Never NULL, never to be freed.
+/// Returns the reason for the state of use, see [`Reading::why`]. Never NULL, never to be freed.
 ///
 /// # Safety
 ///
@@ -157,8 +157,8 @@ pub unsafe extern "C" fn dynocar_reader_set_stale_after_ns(
     })
 }
 
-/// Takes what has come since the last poll; `news` (may be NULL) gets the number of snapshots
-/// that brought something new.
+/// Takes the messages since the last poll; `news` (may be NULL) gets the number of snapshots that brought something
+/// new.
 ///
 /// # Safety
 ///

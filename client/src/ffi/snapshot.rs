@@ -1,4 +1,4 @@
-//! Resistance, parameters and covariances out of a copied snapshot.
+//! Resistance, parameters and covariances from a copied snapshot.
 //!
 //! These functions need no handle: any thread may call them on its own copy.
 

@@ -1,4 +1,4 @@
-//! Braking distance and time for C; the mathematics are [`dynocar_shared::stopping`].
+//! Braking distance and time for C; [`dynocar_shared::stopping`] does the mathematics.
 
 use dynocar_shared::stopping::{BrakeResponse, EffortPoint, RailAdhesion, Stop, StoppingError};
 use dynocar_shared::{RailCondition, Uncertain, vocabulary, wire_struct};
@@ -23,7 +23,7 @@ vocabulary! {
 }
 
 wire_struct! {
-    /// The stop that is asked about; `dynocar_stop` in C. All numbers finite.
+    /// The stop to be computed; `dynocar_stop` in C. All numbers finite.
     #[derive(Default)]
     pub struct StopRequest {
         /// Speed in m/s at which the brake is commanded.

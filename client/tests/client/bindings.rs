@@ -1,5 +1,5 @@
-//! C and Python repeat constants of the library. They are written from it, and these tests hold that they still
-//! agree: `DYNOCAR_WRITE_BINDINGS=1 cargo test --release -p dynocar-client --test client bindings::` writes them
+//! C and Python repeat constants of the library. They are generated from it, and these tests check that they still
+//! agree: `DYNOCAR_WRITE_BINDINGS=1 cargo test --release -p dynocar-client --test client bindings::` generates them
 //! anew.
 
 mod c;
@@ -13,7 +13,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Manoeuvre, PipelineKind, Quantity, Reason, RejectionReason, Status};
 use vocabularies::upper_snake;
 
-/// Compares a file with what it must be, or writes it.
+/// Compares a file with its expected text, or writes it.
 fn hold(path: &str, text: &str) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
     if std::env::var_os("DYNOCAR_WRITE_BINDINGS").is_some() {

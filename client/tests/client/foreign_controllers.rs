@@ -20,7 +20,7 @@ fn example(file: &str) -> PathBuf {
     client_directory().join("examples").join(file)
 }
 
-/// Each field of a sample of the round-trip programs is known from its cycle.
+/// Checks that a sample of the round-trip programs came through: its cycle determines every field.
 fn assert_sample_came_through(sample: &TrainSample) {
     let cycle = (sample.sequence - 1) as f64;
     assert_eq!((sample.time_ns, sample.train_id), (1000 + cycle as i64, TRAIN.0));
@@ -30,8 +30,8 @@ fn assert_sample_came_through(sample: &TrainSample) {
     }
 }
 
-/// Plays the daemon until the controller starts a new run, then falls silent. Gives what the
-/// controller printed, by the first word of each line.
+/// Plays the daemon until the controller starts a new run, then falls silent. Returns the output of the controller, by
+/// the first word of each line.
 fn serve(daemon: &PlayedDaemon, controller: Program) -> HashMap<String, String> {
     let mut first_run = None;
     let mut received = 0;
@@ -57,7 +57,7 @@ fn numbers(line: &str) -> Vec<f64> {
     line.split_whitespace().map(|number| number.parse().unwrap()).collect()
 }
 
-/// Gives what the controller printed.
+/// Checks the round trip and returns the output of the controller.
 fn assert_round_trip(command: &mut Command, daemon: &PlayedDaemon) -> HashMap<String, String> {
     let lines = serve(daemon, Program::start(command.arg(daemon.root()).arg(TRAIN.to_string())));
     let line = |word: &str| lines.get(word).unwrap_or_else(|| panic!("no {word} in {lines:?}"));

@@ -1,4 +1,4 @@
-//! A controller that forks keeps its ends, whatever its child does; this process plays the daemon.
+//! A controller that forks keeps its ends, in spite of anything that its child does; this process plays the daemon.
 
 use std::collections::HashMap;
 use std::process::Command;

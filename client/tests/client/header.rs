@@ -1,5 +1,5 @@
-//! `dynocar.h` is clean C and C++, and the libraries hold the functions that it declares; its numbers and
-//! structs are written from the library (`bindings.rs`), and the compiler checks where each field lies.
+//! `dynocar.h` is clean C and C++, and the libraries hold the functions that it declares; its numbers and structs are
+//! generated from the library (`bindings.rs`), and the compiler checks the offset of each field.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -19,7 +19,7 @@ fn header_words() -> Vec<String> {
         code += if index == 0 { part } else { part.split_once("*/").unwrap().1 };
     }
     let is_word = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
-    // A word keeps what follows it, so that functions and enumerators can be distinguished.
+    // A word keeps the character after it, so that functions and enumerators can be distinguished.
     let mut words = Vec::new();
     let mut rest = code.as_str();
     while let Some(start) = rest.find(is_word) {

@@ -1,5 +1,5 @@
-//! The library as controllers use it, from Rust, C and C++; what allocates is counted in `real_time`, whose
-//! allocator all tests use: it counts by thread.
+//! The library as controllers use it, from Rust, C and C++. `real_time` counts allocations with an allocator that all
+//! tests use: it counts by thread.
 
 mod bindings;
 mod channels;

@@ -1,5 +1,4 @@
-//! The calls that `dynocar.h` marks REAL-TIME allocate as little as it says and make no system
-//! call.
+//! The calls that `dynocar.h` marks REAL-TIME allocate no more than it states and make no system call.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;

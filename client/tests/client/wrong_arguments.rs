@@ -1,4 +1,4 @@
-//! Wrong arguments at the C interface: a code and words, never a crash.
+//! Wrong arguments at the C interface lead to a code and words, never to a crash.
 
 use std::ffi::{CStr, CString, c_char};
 use std::fs::File;

@@ -19,9 +19,9 @@ use dynocar_transport::peer::RoleLock;
 use dynocar_transport::{Host, Role, monotonic_now_ns};
 
 pub const TRAIN: TrainId = TrainId(11);
-/// Where the played daemon's only pipeline stands in its configuration.
+/// Index of the played daemon's only pipeline in its configuration.
 pub const PIPELINE_INDEX: u32 = 3;
-/// A child that says nothing for so long has failed.
+/// A child without output for this time has failed.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// The client's folder, from its own tests and from those of its siblings.

@@ -1,14 +1,14 @@
-//! The estimators that learn a train while it drives, pure.
+//! The estimators that learn a train while it drives, without side effects.
 //!
-//! They stand on the declared model of `dynocar_model`, and know no channel, clock, file, thread or
-//! logger: times and seeds come in as arguments. The daemon runs these pipelines online, `dynocar
-//! identify` offline; both get the same bits from the same samples. The papers' own methods, and the
-//! list of all kinds that a configuration may name, are the library `dynocar_estimators`'s; what
-//! recorded runs show beyond that is `dynocar_analysis`'s. Both are built on this one.
+//! They stand on the declared model of `dynocar_model`, and know no channel, clock, file, thread or logger: times and
+//! seeds come in as arguments. The daemon runs these pipelines online, `dynocar identify` offline; both get the same
+//! bits from the same samples. The library `dynocar_estimators` has the papers' own methods and the list of all kinds
+//! that a configuration may name; `dynocar_analysis` finds everything else that recorded runs show. Both are built on
+//! this one.
 //!
-//! # Layout, in the order a sample takes
+//! # Layout, in the order in which a sample passes
 //!
-//! - [`plausibility`]: whether samples can be true: units, exchanged forces, signs
+//! - [`plausibility`]: whether samples can be true: wrong units, exchanged forces, reversed signs
 //! - [`filter`]: recursive estimators of fixed size, without knowledge of trains
 //! - [`pipeline`]: estimators behind one interface, from sample to snapshot
 //! - [`trial`]: which of several models predicts better, judged while a train runs

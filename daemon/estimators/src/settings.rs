@@ -124,7 +124,7 @@ estimator_kinds! {
     MassKalman(MassKalmanSettings) = MassKalman, |s, t| boxed(MassKalman::new(*s, t));
     /// Kalman filters of resistance and mass together.
     TrainKalman(TrainKalmanSettings) = TrainKalman, |s, t| boxed(TrainKalman::new(*s, t));
-    /// Watches the residual and names what the model may lack.
+    /// Watches the residual and names the effects that the model may lack.
     ResidualMonitor(MonitorSettings) = ResidualMonitor,
         |s, t| boxed(ResidualMonitor::new(*s, t));
     /// Adhesion by sliding-window EM.
@@ -150,7 +150,7 @@ estimator_kinds! {
 }
 
 impl EstimatorSettings {
-    /// Returns whether the estimator, so set, gives what a controller asks for.
+    /// Returns whether the estimator, with these settings, answers a quantity of a controller.
     pub fn answers(&self, quantity: Quantity) -> bool {
         let reports = match self {
             EstimatorSettings::BrakeSmoother(settings) => Some(settings.reports),

@@ -12,7 +12,7 @@ use super::variables::{Begins, FmiEnumeration, Interface, Kind, MISSING, Meaning
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// A step in s that suits every train, where no recording says another.
+/// A step in s that suits every train, used where no recording determines another.
 pub const STEP_DEFAULT_S: f64 = 0.1;
 
 /// Returns the text of `modelDescription.xml`, with the step in s that hosts take by default: the same for every FMU of
@@ -149,7 +149,7 @@ fn indices(interface: &Interface, is_wanted: impl Fn(&Variable) -> bool) -> Vec<
     wanted.map(|(_, index): (_, u32)| index.to_string()).collect()
 }
 
-/// The outputs, with what they hang on where it is less than everything.
+/// Writes the outputs, with their dependencies where these are less than everything.
 fn push_unknowns(xml: &mut String, interface: &Interface, list: &str, on: Option<&str>) {
     let on = on.map(|on| format!(" dependencies=\"{on}\"")).unwrap_or_default();
     push(xml, format_args!("    <{list}>"));
@@ -159,7 +159,7 @@ fn push_unknowns(xml: &mut String, interface: &Interface, list: &str, on: Option
     push(xml, format_args!("    </{list}>"));
 }
 
-/// Returns a page for people: what the FMU takes and gives.
+/// Returns a page for people: the inputs and outputs of the FMU.
 pub fn documentation(interface: &Interface) -> String {
     let Interface { name, about, step, variables, .. } = interface;
     let mut page = format!(

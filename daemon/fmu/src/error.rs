@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use dynocar_analysis::dataset::DatasetError;
 use dynocar_core::pipeline::SettingError;
 
-/// Why a call of the FMU is refused; the instance is as it was before, but for the variables of a row
-/// that were set before the one that is refused.
+/// Why a call of the FMU is refused. The instance is as it was before, except for the variables of a row that were set
+/// before the refused one.
 #[derive(Debug, thiserror::Error)]
 pub enum ModelError {
     /// No variable has this value reference.

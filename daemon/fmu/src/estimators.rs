@@ -1,4 +1,4 @@
-//! The model that learns: the recommended estimators, and every variable of theirs.
+//! The model that learns: the recommended estimators, and all its variables.
 
 use dynocar_core::pipeline::Pipeline;
 use dynocar_core::pipeline::quantities::candidates;

@@ -8,9 +8,9 @@ use crate::variables::MISSING;
 /// The inputs of an instance.
 #[derive(Clone, Copy, Debug)]
 pub struct Inputs {
-    /// As they were set; its number is that of the newest step.
+    /// The inputs as they were set; the sample's number is that of the newest step.
     pub sample: TrainSample,
-    /// By [`SampleField`], in the input's unit per s.
+    /// Slopes by [`SampleField`], in the input's unit per s.
     slopes: [f64; SampleField::ALL.len()],
 }
 
@@ -22,7 +22,7 @@ impl Default for Inputs {
 }
 
 impl Inputs {
-    /// Sets a measured input; [`MISSING`] and NaN say that it was not measured.
+    /// Sets a measured input; [`MISSING`] and NaN mean that it was not measured.
     pub fn set(&mut self, field: SampleField, value: f64) {
         if value.is_nan() || value == MISSING {
             self.sample.valid &= !field.bit();
@@ -36,8 +36,8 @@ impl Inputs {
         self.sample.get(field).unwrap_or(MISSING)
     }
 
-    /// Sets a slope for one step; a simulator that interpolates towards what is missing gives none
-    /// that is a number.
+    /// Sets a slope for one step; a simulator that interpolates towards a missing value gives a slope that is no
+    /// number.
     pub fn set_slope(&mut self, field: SampleField, per_s: f64) {
         self.slopes[field as usize] = if per_s.is_finite() { per_s } else { 0.0 };
     }

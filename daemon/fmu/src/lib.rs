@@ -1,10 +1,9 @@
-//! The daemon's own estimators, and the train that they describe, as Functional Mock-up Units for
-//! co-simulation (FMI 2.0), so that Simulink, OpenModelica or Dymola take them into a model.
+//! The daemon's own estimators, and the train that they describe, as Functional Mock-up Units for co-simulation (FMI
+//! 2.0), which Simulink, OpenModelica or Dymola can include in a model.
 //!
-//! The estimators run in the simulator's process, without shared memory, on one sample for each
-//! step, and give the bits that `dynocar identify` gives for the same samples. The train takes
-//! forces and gives its speed by the law by which `dynocar explain` predicts. One library holds both
-//! models; by its GUID an instance is one or the other.
+//! The estimators run in the simulator's process, without shared memory, on one sample for each step, and give the bits
+//! that `dynocar identify` gives for the same samples. The train takes forces and gives its speed by the law by which
+//! `dynocar explain` predicts. One library holds both models; the GUID decides which of the two an instance is.
 //!
 //! # Layout
 //!

@@ -1,5 +1,5 @@
-//! Model behind an instance of an FMU: its inputs, the model that takes them, and the order in which the standard
-//! lets calls come.
+//! The model behind an instance of an FMU: its inputs, the estimators or the train that takes them, and the order of
+//! calls that the standard prescribes.
 
 use std::ffi::CStr;
 
@@ -15,9 +15,9 @@ use crate::plant::{
 };
 use crate::variables::{Begins, Interface, Kind, Meaning, SnapshotField, Variable};
 
-/// By so much of the time a point may be off, as sums of steps are rounded.
+/// Share of the time by which a communication point may be off, since sums of steps are rounded.
 const POINT_TOLERANCE: f64 = 1e-9;
-/// Later times in s have no number of ns.
+/// Time in s beyond which a number of ns cannot hold the time.
 const TIME_MAX_S: f64 = 9e9;
 
 /// Where an instance stands between two calls.
@@ -106,7 +106,7 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// In the wrong order, or what is wrong with the files.
+    /// When the call is out of order, or the files are wrong.
     pub fn enter_initialization(&mut self) -> Result<(), ModelError> {
         self.require(&[Phase::Instantiated], "fmi2EnterInitializationMode")?;
         self.build()?;
@@ -118,7 +118,7 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// In the wrong order, or what is wrong with the files.
+    /// When the call is out of order, or the files are wrong.
     pub fn exit_initialization(&mut self) -> Result<(), ModelError> {
         self.require(&[Phase::Initializing], "fmi2ExitInitializationMode")?;
         if matches!(self.behind, Behind::Nothing) {
@@ -202,7 +202,7 @@ impl Model {
         *self = Model::new(self.interface, self.files.resources());
     }
 
-    /// Refuses every later call but a reset: nobody knows what a fault left behind.
+    /// Refuses every later call but a reset: after a fault the state is unknown.
     pub fn break_off(&mut self) {
         self.phase = Phase::Broken;
     }

@@ -71,7 +71,7 @@ const VARIABLES: &[Variable] = &[
 pub(crate) const BEGINNING: Beginning =
     Beginning { position_m: 0.0, speed_mps: 0.0, is_held_at_rest: true };
 
-/// `None` for what no train begins with.
+/// Returns the beginning with another value; `None` for a value that no train can begin with.
 pub(crate) fn with_beginning(beginning: Beginning, what: Begins, value: f64) -> Option<Beginning> {
     match what {
         Begins::Speed if (0.0..=SPEED_MAX_MPS).contains(&value) => {
@@ -105,7 +105,7 @@ pub(crate) fn require_drivable(inputs: &Inputs) -> Result<(), ModelError> {
 /// A longer step in s is refused: a simulator that skips hours has lost its way.
 pub const STEP_MAX_S: f64 = 3600.0;
 
-/// Returns a shorter step in s would push out of memory what a dead time still needs.
+/// Returns the least step in s: with a shorter one, numbers that a dead time still needs would leave the memory.
 pub(crate) fn least_step_s(train: &DrivenTrain) -> f64 {
     train.dead_time_s() / 1000.0
 }

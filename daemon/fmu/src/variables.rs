@@ -1,5 +1,5 @@
-//! Variables of an FMU. Each model has a table of them, from which both `modelDescription.xml` and the values that
-//! are written and read come. A variable's value reference is its place in the table. Units are in the SI's base units.
+//! Variables of an FMU. Each model has a table of them, which determines both `modelDescription.xml` and the values
+//! that are set and got. A variable's value reference is its index in the table. Units are in the SI's base units.
 
 use dynocar_analysis::driven::ForcePart;
 use dynocar_shared::layout::{FieldLayout, hex_digits, layout_hash};
@@ -26,8 +26,8 @@ pub struct Interface {
     pub takes_slopes: bool,
 }
 
-/// A measured input of this value is missing, as is one that is NaN; what unconnected inputs start
-/// with. Modelica knows no NaN.
+/// A measured input of this value is missing, as is one that is NaN; unconnected inputs start with it. Modelica knows
+/// no NaN.
 pub const MISSING: f64 = 1e30;
 
 impl Interface {
@@ -140,11 +140,11 @@ pub enum Meaning {
     Direction,
     /// Input: whether wheel-slide protection is active.
     WheelSlide,
-    /// Output: what an estimator says.
+    /// Output: an estimator's result.
     Estimate(PipelineKind, SnapshotField),
     /// Parameter: how the driven train begins.
     Begins(Begins),
-    /// Output: what the driven train does.
+    /// Output: a value of the driven train's motion.
     Driven(DrivenValue),
 }
 
@@ -286,7 +286,7 @@ pub(crate) const fn digits(digits: &[u8; 16]) -> &str {
     }
 }
 
-/// A unit and what it is in base units, as the attributes of `BaseUnit`.
+/// A unit and its expression in base units, as the attributes of `BaseUnit`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FmiUnit {
     /// Its name; empty for a number without a unit.

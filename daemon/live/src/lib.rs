@@ -1,9 +1,7 @@
 //! `dynocar live`: samples and snapshots served to viewers as they come, by the Foxglove WebSocket protocol.
 //!
-//! Topics, schemas and messages are those of a recording (`dynocar_mcap`), and the channels are
-//! read by the same readers: what is seen live is what would be recorded, but for the samples, of which
-//! viewers get as many as a picture needs.
-//!
+//! Topics, schemas and messages are those of a recording (`dynocar_mcap`), and the same readers read the channels: a
+//! viewer sees the same as a recorder, but it gets only as many samples as a picture needs.
 //! # Layout
 //!
 //! - [`live`]: reads the channels and serves until it is asked to end

@@ -14,9 +14,9 @@ use crate::viewers::{LiveError, Viewers, report_viewers};
 
 /// Messages that wait for one viewer; then the oldest are dropped.
 pub const QUEUE: usize = 1024;
-/// How often the clocks are compared.
+/// Time between two comparisons of the clocks.
 const COMPARE: Duration = Duration::from_millis(400);
-/// How long viewers have to take leave.
+/// Time that viewers have to close their connections.
 const LEAVE: Duration = Duration::from_secs(1);
 
 /// Settings of the server: contents and address.
@@ -41,7 +41,7 @@ pub fn live(settings: &LiveSettings, stop: &AtomicBool) -> Result<(), LiveError>
     // a channel while it is still being advertised on another thread.
     let runtime = Builder::new_current_thread().enable_all().build().map_err(LiveError::System)?;
     let served = runtime.block_on(serve(settings, stop));
-    // Nobody waits for what viewers left undone.
+    // Nobody waits for tasks that viewers left unfinished.
     runtime.shutdown_background();
     served
 }

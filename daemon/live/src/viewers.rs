@@ -1,8 +1,9 @@
 //! Channels that are advertised while somebody writes them, the messages on them, and reports about viewers that do not
 //! keep up.
 //!
-//! The protocol's library drops the oldest messages of a viewer whose queue is full, and says so in its log, at most every
-//! 30 s; it counts none. Viewers get fewer samples than the channel carries: a picture needs no thousand a second.
+//! The protocol's library drops the oldest messages of a viewer whose queue is full. It reports this in its log, at
+//! most every 30 s, but counts no dropped message. Viewers get fewer samples than the channel carries: a picture needs
+//! no thousand a second.
 
 use std::collections::HashMap;
 use std::fmt::{Debug, Write};
@@ -204,7 +205,7 @@ impl ServerListener for Listener {
     }
 }
 
-/// Lets through as many as are wanted of what comes faster, evenly.
+/// Passes on a given number of samples per second, evenly spaced, of those that come faster.
 #[derive(Clone, Copy, Debug)]
 pub struct Thinning {
     interval_ns: i64,
@@ -218,7 +219,7 @@ impl Thinning {
         Thinning { interval_ns, due_ns: i64::MIN }
     }
 
-    /// Returns whether what came at this moment is to go on.
+    /// Returns whether a sample that came at this moment is to be passed on.
     pub fn lets_through(&mut self, at_ns: i64) -> bool {
         if at_ns < self.due_ns && self.due_ns.saturating_sub(at_ns) <= self.interval_ns {
             return false;
@@ -235,7 +236,7 @@ const FULL_QUEUE: &str = "outbox for client ";
 /// How its sentences about a viewer that broke off begin.
 const BROKEN_OFF: [&str; 2] = ["Error receiving from client ", "Error sending message to client "];
 
-/// Reports from now on what the protocol's library has to say of viewers.
+/// Reports from now on the messages of the protocol's library about viewers.
 pub fn report_viewers() {
     // Only a second call fails.
     let _ = registry().with(Reporter).try_init();

@@ -1,8 +1,8 @@
 //! Samples and snapshots as protobuf messages, and back, to the bit.
 //!
-//! A value with all bits 0 is left out, as protobuf has it; a negative zero is written. A sample's
-//! value whose bit in `valid` is not set is no value, and is left out too. The names under `estimate`
-//! and `rejected` repeat what the arrays hold, and are passed over when a message is read.
+//! A value with all bits 0 is left out, as usual in protobuf; a negative zero is written. A sample's value whose bit in
+//! `valid` is not set counts as missing, and is left out too. The names under `estimate` and `rejected` repeat the
+//! contents of the arrays, and are skipped when a message is read.
 
 use dynocar_shared::layout::Words;
 use dynocar_shared::schema::{Field, Missing};
@@ -18,10 +18,10 @@ use crate::schema::{
     rejection_number,
 };
 
-/// Why bytes are no message of ours.
+/// Why bytes are not one of our messages.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CodecError {
-    /// They are no protobuf message.
+    /// The bytes are no protobuf message.
     #[error("not a protobuf message: {0}")]
     Malformed(#[from] DecodeError),
     /// A field is of another type.

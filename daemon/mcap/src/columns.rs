@@ -1,7 +1,7 @@
-//! Columns of tables for the contents of a recording, made from the tables that the messages are made from.
+//! Columns of tables for the contents of a recording, made from the same tables as the messages.
 //!
-//! Arrays stand as they are, in lists of fixed length, so that nothing is lost; what they hold stands once
-//! more under names with units, as in the messages.
+//! Arrays are written as they are, as lists of fixed length, so that nothing is lost; their contents appear once more
+//! under names with units, as in the messages.
 
 use std::sync::LazyLock;
 
@@ -25,11 +25,11 @@ pub enum ColumnSource {
     LogTime,
     /// A field of a sample or a snapshot.
     Field(&'static Field),
-    /// A parameter's value: repeats what arrays hold.
+    /// A parameter's value, which repeats the contents of arrays.
     Value(Parameter),
     /// Addition of [`SUFFIXES`], by the index there: repeats the contents of arrays.
     OfEstimate(Parameter, usize),
-    /// How many samples were refused for a reason: repeats what an array holds.
+    /// How many samples were refused for a reason, which repeats an entry of an array.
     Rejected(RejectionReason),
     /// A field of an event, by its index.
     Event(usize),
@@ -192,7 +192,7 @@ impl RecordingColumn {
         members.collect::<Vec<_>>().join(", ")
     }
 
-    /// Returns true for a column that only repeats what others hold.
+    /// Returns true for a column that only repeats the contents of others.
     pub fn is_repetition(&self) -> bool {
         matches!(
             self.source,
@@ -202,7 +202,7 @@ impl RecordingColumn {
 }
 
 impl RecordingRow {
-    /// Returns the same for whoever writes messages.
+    /// Returns the same row as a message, for writers of messages.
     pub fn message(&self) -> Message<'_> {
         match self {
             RecordingRow::Sample(it) => Message::Sample(it),
@@ -246,7 +246,7 @@ impl RecordingRow {
         }
     }
 
-    /// Sets what a column holds; `words` is `None` where the value is missing.
+    /// Sets the value of a column; `words` is `None` where the value is missing.
     pub fn set_words(&mut self, column: &RecordingColumn, words: Option<&[u64]>) {
         match (self, column.source, words) {
             (RecordingRow::Sample(it), ColumnSource::Field(field), Some(words)) => {

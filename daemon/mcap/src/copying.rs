@@ -29,9 +29,9 @@ pub struct Copied {
     pub endings: Vec<FileEnding>,
 }
 
-/// Copies what can be read of files, in their order, into a new one, ours or not, and brings it to the disk. A
-/// file that is attached to several is so once; one of several of which a power cut left nothing takes nothing
-/// from the others.
+/// Copies the readable part of files, in their order, into a new one, and brings it to the disk; the files may come
+/// from other recorders. A file that is attached to several of them is copied once. If a power cut left one of several
+/// files empty, the others are copied nevertheless.
 ///
 /// # Errors
 ///
@@ -49,7 +49,7 @@ pub fn recover_on(storage: &dyn Storage, from: &[PathBuf], to: &Path) -> Result<
     copy(storage, from, to, &mut (), |_, ()| Ok(()))
 }
 
-/// The same; `watcher` is given what the files hold, and `add` writes what is to follow.
+/// The same; `watcher` is given the contents of the files, and `add` writes the messages that are to follow.
 ///
 /// # Errors
 ///
@@ -172,8 +172,8 @@ impl<V: Visitor<Error = CopyError>> Visitor for Copier<'_, V> {
     }
 }
 
-/// Reads the files of a recording that rotated, in order, as if they were one: what each repeats is given
-/// once. Gives how each ends.
+/// Reads the files of a recording that rotated, in order, as if they were one: contents that each file repeats are
+/// given once. Returns how each file ends.
 ///
 /// # Errors
 ///

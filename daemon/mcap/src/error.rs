@@ -13,14 +13,14 @@ use crate::schema::SAMPLE;
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {problem}", path.display())]
 pub struct AtPath<P> {
-    /// Which.
+    /// The file or folder.
     pub path: PathBuf,
-    /// What.
+    /// Its error.
     pub problem: P,
 }
 
 impl<P> AtPath<P> {
-    /// For a file, what makes an error of what is wrong with it.
+    /// Returns a function that turns an error of a file into one with its path.
     pub fn of<T: Into<P>>(path: &Path) -> impl Fn(T) -> Self {
         move |problem| AtPath { path: path.into(), problem: problem.into() }
     }
@@ -57,7 +57,7 @@ pub enum ReadProblem {
         /// The channel.
         topic: String,
     },
-    /// A message is not what its channel says.
+    /// A message does not match its channel's description.
     #[error("{topic}, message {number}: {source}")]
     Malformed {
         /// The channel.

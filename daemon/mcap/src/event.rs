@@ -23,7 +23,7 @@ message! {
         5 status: Option<i32> = int32 optional (Status);
         /// The reason of that status.
         6 reason: Option<i32> = int32 optional (Reason);
-        /// How many, for what is counted.
+        /// How many samples were lost.
         7 count: Option<u64> = uint64 optional;
         /// The same in words.
         8 text: String = string;

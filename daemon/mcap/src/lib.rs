@@ -1,21 +1,21 @@
 //! Recordings of samples and snapshots as [MCAP](https://mcap.dev) files with protobuf messages: read, written, copied
 //! and annotated. Another package records.
 //!
-//! Samples are the truth of a recording: the daemon's pipelines are functions of them, so that every
-//! snapshot can be computed again, and is, by `dynocar replay --verify`.
+//! Samples are the truth of a recording: the daemon's pipelines are functions of them, so that every snapshot can be
+//! computed again. `dynocar replay --verify` does so.
 //!
 //! # Layout
 //!
 //! - [`schema`]: the protobuf messages, made from the layouts of sample and snapshot
-//! - [`columns`]: the same as columns of tables, for whoever writes tables
+//! - [`columns`]: the same as columns of tables, for writers of tables
 //! - [`codec`]: samples and snapshots as messages, and back, to the bit
-//! - [`event`]: events around them
+//! - [`event`]: events around samples and snapshots
 //! - [`message`]: messages that are declared once
 //! - [`topic`]: the streams of messages, and the messages
 //! - [`writing`], [`reading`]: MCAP files, written without seeking and read as far as they are whole
 //! - [`recording`]: a recording, of one file or more, in memory, in the order in which it was recorded
-//! - [`copying`]: copies of recordings, ours or not: a broken file made whole
-//! - [`annotate`]: an explanation beside the data
+//! - [`copying`]: copies of recordings, ours or not; repair of a truncated file
+//! - [`annotate`]: an explanation next to the data
 //! - [`error`]: errors of files, with their paths
 
 pub mod annotate;

@@ -15,7 +15,7 @@ pub struct MessageField {
     pub meaning: &'static str,
 }
 
-/// A message with the table of its fields from one list: number, name, type and what protobuf calls it, and the
+/// A message with the table of its fields from one list: number, name, type and protobuf's name of it, and the
 /// vocabulary whose numbers it holds.
 macro_rules! message {
     (
@@ -40,7 +40,7 @@ macro_rules! message {
         impl $name {
             /// Its name in the package.
             pub const NAME: &str = stringify!($name);
-            /// Meaning of the field.
+            /// Meaning of the message.
             pub const MEANING: &str = $what;
             /// Its fields, in order.
             pub const FIELDS: &[$crate::message::MessageField] = &[ $(

@@ -19,9 +19,9 @@ use crate::schema::{EVENT, SAMPLE, SNAPSHOT, is_described_alike};
 /// How a file ends.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FileEnding {
-    /// With its index and its last bytes.
+    /// The file ends with its index and its last bytes.
     Whole,
-    /// Before its end, or damaged.
+    /// The file breaks off before its end, or is damaged.
     Broken {
         /// Bytes up to which it was read.
         read_bytes: u64,
@@ -67,7 +67,7 @@ pub enum RecordingItem<'a> {
     Event(&'a Event),
 }
 
-/// A message or a channel of somebody else, for whoever copies a file.
+/// A message or a channel of another writer, for programs that copy a file.
 #[derive(Debug)]
 pub struct Raw<'a> {
     /// The channel.
@@ -91,7 +91,7 @@ pub struct ChannelInfo {
     pub schema: Option<(String, String, Vec<u8>)>,
 }
 
-/// Who is given what a file holds.
+/// Receiver of the contents of a file.
 pub trait Visitor {
     /// Why nothing more is taken.
     type Error: From<ReadError>;
@@ -127,7 +127,7 @@ const EXPANSION_MAX: u64 = 64;
 /// Largest size in bytes of a chunk that is larger than its file.
 const EXPANDED_BYTES: u64 = 256 << 20;
 
-/// Reads a file, and gives what it holds as far as it is whole.
+/// Reads a file and passes on its contents as far as it is whole.
 ///
 /// # Errors
 ///
@@ -279,7 +279,7 @@ fn require_our_layout(channel: &ChannelInfo) -> Result<(), ReadProblem> {
     match channel.metadata.get("layout") {
         Some(found) if found == expected => Ok(()),
         Some(found) => Err(ReadProblem::OtherSchema { topic, expected, found: found.clone() }),
-        // Tools that write messages anew keep what describes these, not what is said of the channel.
+        // Tools that rewrite messages keep their descriptions, but not the channel's metadata.
         None if channel.schema.as_ref().is_some_and(|it| is_described_alike(&it.0, &it.2)) => {
             Ok(())
         }

@@ -1,5 +1,5 @@
-//! A recording in memory: its messages in the order in which they were recorded, whatever the order in which another
-//! tool has written them.
+//! A recording in memory: its messages in the order in which they were recorded, even if another tool has reordered
+//! them.
 
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};

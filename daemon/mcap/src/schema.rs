@@ -1,9 +1,8 @@
 //! The protobuf messages of a recording, made from the layouts of sample and snapshot.
 //!
-//! A field's number is its place in the layout, counted from 1.
-//! Measured values are `optional`: missing is missing. Numbers of a vocabulary are protobuf
-//! enumerations. What arrays hold stands once more under names with units in `estimate` and
-//! `rejected`.
+//! A field's number is its place in the layout, counted from 1. Measured values are `optional`: a missing value is left
+//! out. Numbers of a vocabulary are protobuf enumerations. The contents of arrays appear once more under names with
+//! units in `estimate` and `rejected`.
 
 use std::sync::LazyLock;
 
@@ -27,7 +26,7 @@ pub const SNAPSHOT: &str = "dynocar.ParameterSnapshot";
 /// Name of the message of an event.
 pub const EVENT: &str = "dynocar.Event";
 
-/// Number of the field `estimate` of a snapshot: what the parameters are, by name.
+/// Number of the field `estimate` of a snapshot: the parameters by name.
 pub const ESTIMATE: u32 = 101;
 /// Number of the field `rejected` of a snapshot: how many samples were refused, by name.
 pub const REJECTED: u32 = 102;
@@ -79,7 +78,7 @@ pub const SUFFIXES: [(u32, &str, &str, OfEstimate); 3] = [
     (300, "high", "The upper end of its 95 % interval.", |value, std| value + HALF_95 * std),
 ];
 
-/// Returns the name of what is said of a parameter in addition to its value: the unit stays last.
+/// Returns the name of an addition to a parameter's value: the unit stays last.
 pub fn suffixed_name(parameter: Parameter, word: &str) -> String {
     let name = parameter.full_name();
     let unit = unit_end(name).0;

@@ -1,4 +1,4 @@
-//! Writing MCAP files without seeking: flushed messages can be read, whatever happens next.
+//! Writing MCAP files without seeking: flushed messages can be read, even after an abrupt end.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
@@ -15,9 +15,9 @@ use mcap::{Attachment, WriteOptions, Writer};
 use crate::schema::DESCRIPTORS;
 use crate::topic::{ENCODING, LAYOUT, Message, Topic};
 
-/// Name of the metadata record that every recording begins with.
+/// Name of the metadata record at the beginning of every recording.
 pub const METADATA: &str = "dynocar";
-/// Name of the metadata record beside an attached configuration.
+/// Name of the metadata record that belongs to an attached configuration.
 pub const CONFIGURATION: &str = "configuration";
 
 /// Returns the folder in which a configuration of this number is attached.
@@ -29,7 +29,7 @@ pub fn folder_of_configuration(number: u32) -> String {
 const CHUNK_BYTES: u64 = 1 << 20;
 const LIBRARY: &str = concat!("dynocar ", env!("CARGO_PKG_VERSION"));
 
-/// Wall time of the host's monotonic clock.
+/// Offset of the wall clock to the host's monotonic clock.
 #[derive(Clone, Copy, Debug)]
 pub struct WallClock {
     offset_ns: i64,
@@ -42,7 +42,7 @@ impl WallClock {
         WallClock { offset_ns: i64::try_from(wall).unwrap_or(i64::MAX) - monotonic_now_ns() }
     }
 
-    /// Returns a clock on which both are the same, for what was recorded on another host.
+    /// Returns a clock on which both are the same, for data that was recorded on another host.
     pub fn of_another_host() -> Self {
         WallClock { offset_ns: 0 }
     }
@@ -59,7 +59,7 @@ pub struct RecordingWriter<W: Write> {
     writer: Option<Writer<NoSeek<W>>>,
     channels: HashMap<Topic, u16>,
     clock: WallClock,
-    /// Time at which the next message is logged, whatever the clock says.
+    /// Time at which the next message is logged, independent of the clock.
     log_time: Option<u64>,
     message: Vec<u8>,
 }
@@ -84,7 +84,7 @@ impl<W: Write> RecordingWriter<W> {
         Ok(recording)
     }
 
-    /// Begins a file for what was recorded before, its metadata included.
+    /// Begins a file for data that was recorded before, its metadata included.
     ///
     /// # Errors
     ///
@@ -107,12 +107,12 @@ impl<W: Write> RecordingWriter<W> {
         })
     }
 
-    /// Logs the next message or attached file at this wall time, whatever the clock says.
+    /// Logs the next message or attached file at this wall time, independent of the clock.
     pub fn log_next_at(&mut self, log_time: u64) {
         self.log_time = Some(log_time);
     }
 
-    /// Takes another comparison of the clocks for what comes from now on.
+    /// Takes another comparison of the clocks for the messages from now on.
     pub fn set_clock(&mut self, clock: WallClock) {
         self.clock = clock;
     }

@@ -1,11 +1,10 @@
 //! Declared model of a train and its line, and the forces that follow from it, without side effects.
 //!
-//! Everything that learns, explains or simulates stands on this library: the live estimators
+//! Every part of the project that learns, explains or simulates stands on this library: the live estimators
 //! (`dynocar_core`), the papers' methods, the reader of recorded runs, the analysis, the daemon.
-//! It estimates nothing, and knows no channel, clock, file, thread or logger: times come in as
-//! arguments.
+//! It estimates nothing, and knows no channel, clock, file, thread or logger: times come in as arguments.
 //!
-//! # Layout, in the order a sample takes
+//! # Layout, in the order in which a sample passes
 //!
 //! - [`units`]: the units that quantities may be in
 //! - [`train`], [`track`]: the declared train and line

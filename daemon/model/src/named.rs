@@ -1,6 +1,7 @@
 //! Enums whose members have names in files, on command lines and in answers.
 
-/// Declares such an enum: each member with what it is and its name; `what` says where the names stand.
+/// Declares such an enum: each member with its documentation and its name; `("in a file")` says where the names are
+/// used.
 #[macro_export]
 macro_rules! named {
     ($(#[$meta:meta])* $name:ident ($what:literal) {

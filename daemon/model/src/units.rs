@@ -1,7 +1,6 @@
-//! The units a quantity may be in.
+//! The units that quantities of files may have.
 //!
-//! Every unit converts to its dimension's base unit: SI, except °C for temperature, since that
-//! is what a sample holds.
+//! Every unit converts to its dimension's base unit, which is SI, except °C for temperature, the unit of a sample.
 
 /// Dimension of a unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -66,7 +65,7 @@ const STANDARD_GRAVITY_MPS2: f64 = 9.80665;
 /// Watts in a mechanical horsepower: 550 foot pounds-force in a second (NIST SP 811, appendix B.8).
 const HORSEPOWER_W: f64 = 550.0 * 0.3048 * POUND_FORCE_N;
 
-/// The units, with what files call them; of a dimension the first ones are usual.
+/// The units, with their spellings in files; the first units of a dimension are usual.
 static UNITS: [Unit; 80] = {
     use Dimension::*;
     [
@@ -328,7 +327,7 @@ impl Unit {
         Self::all().filter(move |unit| unit.dimension == dimension)
     }
 
-    /// Returns the units of a dimension that recorders use without saying so: what an unknown factor may be.
+    /// Returns the units of a dimension that recorders use without stating them: the candidates for an unknown factor.
     pub fn usual_of(dimension: Dimension) -> impl Iterator<Item = Unit> {
         Self::of(dimension).filter(|unit| unit.is_usual)
     }

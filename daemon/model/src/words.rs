@@ -1,5 +1,5 @@
-//! Words of every answer: kinds of effects, their numbers and places, alike in statements, on terminals, pages and
-//! timelines, in events, in the store of models, and for a fleet.
+//! Words of every answer: kinds of effects, their numbers and places, in the same words in statements, on terminals,
+//! pages and timelines, in events, in the store of models, and for a fleet.
 
 use dynocar_shared::vocabulary::{EffectKind, KindRow};
 
@@ -54,7 +54,7 @@ pub fn parameter(name: &str) -> (&str, &'static str) {
     }
 }
 
-/// Returns the least that a parameter can be: what no interval reaches below.
+/// Returns the least value of a parameter, below which no interval reaches.
 pub fn least(name: &str) -> f64 {
     match name {
         "c_factor"
@@ -121,7 +121,7 @@ pub fn figure(name: &str, value: f64, half: f64) -> Option<String> {
     })
 }
 
-/// Returns a wheel's wrong diameter by what the speed reads, with its 95 % interval.
+/// Returns the words for a wrong wheel diameter: the error of the measured speed, with its 95 % interval.
 fn speed_error(scale: f64, half: f64) -> String {
     let side = if scale > 1.0 { "high" } else { "low" };
     let percent =

@@ -1,5 +1,5 @@
 //! Arrow's schema of a table, which programs that use Arrow leave in a Parquet file. It states facts that Parquet
-//! cannot: that numbers are times, and units and meanings of columns.
+//! cannot state: that numbers are times, and the units and meanings of columns.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -12,7 +12,7 @@ use crate::table::{ENTRY, integer};
 /// Key of a file's metadata that holds Arrow's schema.
 pub const KEY: &str = "ARROW:schema";
 
-/// A type by Arrow's schema, as far as Parquet's does not show it.
+/// A type according to Arrow's schema, as far as Parquet's does not show it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Hint {
     /// Whole numbers are times.
@@ -90,7 +90,7 @@ fn hint(buffer: &Buffer, field: usize) -> Option<Hint> {
     Some(Hint::Time { name, per_second: 1000u64.checked_pow(unit)? })
 }
 
-/// Bytes laid out by flatbuffers; what does not lie within them is not there.
+/// Bytes laid out by flatbuffers; a part that does not lie within them counts as missing.
 struct Buffer<'b>(&'b [u8]);
 
 impl Buffer<'_> {

@@ -1,5 +1,5 @@
-//! Types of the columns of a Parquet file, in Arrow's words, by the file's own schema and by Arrow's, which programs that
-//! use Arrow leave in the file.
+//! Types of the columns of a Parquet file, in Arrow's terms, determined by the file's own schema and by Arrow's, which
+//! programs that use Arrow leave in the file.
 
 use parquet::basic::{ConvertedType, LogicalType, TimeUnit, Type as PhysicalType};
 use parquet::schema::types::Type;

@@ -1,4 +1,4 @@
-//! A Parquet file of any program as columns of numbers: all its columns by name, the contents of the wanted ones, and
+//! A Parquet file of any program as columns of numbers: the names of all columns, the contents of the wanted ones, and
 //! the train of each row.
 
 use std::collections::BTreeMap;
@@ -17,9 +17,9 @@ use crate::column_type::CellKind;
 use crate::error::{TableProblem, guarded};
 use crate::file::{ColumnReader, FileColumn, ParquetFile, damaged};
 
-/// Returns all columns of a Parquet file, with the numbers in the mapped ones: what is missing is `NaN`, true is 1 and
-/// false 0. Where a mapped column is not there, none has numbers. Beside them come the trains, where a column says
-/// whose the rows are.
+/// Returns all columns of a Parquet file, with the numbers in the mapped ones: a missing value is `NaN`, true is 1 and
+/// false 0. Where a mapped column is not there, no column has numbers. The train of each row comes with them, where a
+/// column names it.
 ///
 /// # Errors
 ///

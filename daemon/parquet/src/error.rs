@@ -1,7 +1,7 @@
 //! Reasons why a Parquet file cannot be read.
 //!
-//! The library that reads Parquet takes some of a file's numbers for granted: where a damaged file breaks
-//! that, it panics. For us that is an error of the file like any other.
+//! The library that reads Parquet takes some of a file's numbers for granted, and panics where a damaged file has
+//! others. For us that is an error of the file like any other.
 
 use std::any::Any;
 use std::cell::Cell;
@@ -16,13 +16,13 @@ pub type ParquetFileError = AtPath<TableProblem>;
 /// Errors of a Parquet file.
 #[derive(Debug, thiserror::Error)]
 pub enum TableProblem {
-    /// The system does not give it.
+    /// The system does not give the file.
     #[error(transparent)]
     Unreadable(#[from] std::io::Error),
-    /// It is of another format, or broken.
+    /// The file is of another format, or broken.
     #[error("not a Parquet file that can be read: {0}")]
     NotParquet(String),
-    /// It is Parquet of somebody else.
+    /// The file is Parquet, but not written by Dynocar.
     #[error(
         "not a recording: expected Parquet that `dynocar convert` has written; other Parquet files are \
          the runs of a dataset, named in its dataset.toml"
@@ -73,7 +73,7 @@ thread_local! {
     static IS_READING: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Reads a file; what the library panics at is reported as the file's.
+/// Reads a file; a panic of the library is reported as an error of the file.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! A Parquet file that is open: its columns, and the cells of one after the other.
+//! An open Parquet file: its columns, and the cells of one column after the other.
 
 use std::collections::BTreeMap;
 
@@ -210,7 +210,7 @@ pub fn damaged(found: &str) -> TableProblem {
 }
 
 impl FileColumn {
-    /// Returns the words of what was found where another type was expected.
+    /// Returns the error of a column whose type is not the expected one.
     pub fn refused(&self, expected: impl Into<String>) -> TableProblem {
         TableProblem::OtherType {
             column: self.name.clone(),

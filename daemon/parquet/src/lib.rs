@@ -1,16 +1,16 @@
-//! Recordings as Parquet, without loss and back; and Parquet files of anybody as columns of numbers.
+//! Recordings as Parquet, without loss and back; and Parquet files of any program as columns of numbers.
 //!
-//! A recording is a folder: one file of samples for each train, one of snapshots for each pipeline, one
-//! of events, one each of what an MCAP file has attached and as metadata. `message_number` says in which order
-//! the messages were recorded. A file of samples alone is a recording too: it carries the configuration.
+//! A recording is a folder: one file of samples for each train, one of snapshots for each pipeline, one of events, one
+//! of the attachments of an MCAP file and one of its metadata. `message_number` gives the order in which the messages
+//! were recorded. A file of samples alone is a recording too: it carries the configuration.
 //!
 //! # Layout
 //!
 //! - [`table`]: the tables of a recording, after `dynocar_mcap::columns`
-//! - [`arrow_schema`]: Arrow's schema of a table, beside Parquet's
+//! - [`arrow_schema`]: Arrow's schema of a table, in addition to Parquet's
 //! - [`error`]: why a file cannot be read, and how a damaged file affects its library
 //! - [`column_type`], [`file`](mod@file): types of the columns of a file, and their cells
-//! - [`columns`]: a Parquet file of anybody as columns of numbers, and whose its rows are
+//! - [`columns`]: a Parquet file of any program as columns of numbers, and the train of each row
 //! - [`reading`]: Parquet to the messages of a recording, and to MCAP
 //! - [`table_file`], [`writing`]: MCAP to Parquet
 

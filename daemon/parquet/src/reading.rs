@@ -1,4 +1,4 @@
-//! Parquet, a folder or a file of samples alone, as a recording, and as a new MCAP file.
+//! Parquet, a folder or a file of samples alone, read as a recording, or written as a new MCAP file.
 
 use std::collections::BTreeMap;
 use std::fs::File;

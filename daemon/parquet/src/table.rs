@@ -10,7 +10,7 @@ use parquet::basic::{LogicalType, Repetition, TimeUnit, Type as PhysicalType};
 use parquet::errors::ParquetError;
 use parquet::schema::types::{Type, TypePtr};
 
-/// Key of a file's metadata: which table of a recording it is.
+/// Key of a file's metadata: the table of a recording that the file holds.
 pub const KIND: &str = "dynocar.table";
 /// Key of a file's metadata: the layout of its messages.
 pub const LAYOUT: &str = "dynocar.layout";

@@ -1,4 +1,4 @@
-//! A file of a table that is written, part of the rows after part.
+//! A file of a table while it is written, one part of the rows after the other.
 
 use std::fs::File;
 use std::path::Path;
@@ -18,11 +18,11 @@ use crate::table::file_schema;
 /// Cells of a column, row after row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cells {
-    /// Numbers as words, as many for each row as a list has entries; 0 where they are missing.
+    /// Numbers as words, as many for each row as a list has entries; 0 for missing ones.
     pub words: Vec<u64>,
-    /// Texts and bytes that are there, for a column of them.
+    /// The texts or byte strings that are not missing, for a column of these.
     pub bytes: Vec<ByteArray>,
-    /// Whether a row's value is there.
+    /// Whether a row has a value.
     pub is_there: Vec<bool>,
 }
 

@@ -144,7 +144,7 @@ impl Tables<'_> {
         let Tables { folder, tables, attached, metadata, written, .. } = self;
         let path_of = |name: &str| folder.join(format!("{name}.parquet"));
         for (name, table) in tables {
-            // A file of samples can be handed on alone: it says what the train is.
+            // A file of samples can be passed on alone: it carries the description of the train.
             let said = name.starts_with("samples-").then_some(&attached);
             let path = path_of(&name);
             table.finish(&path, said.into_iter().flatten()).map_err(WriteError::of(&path))?;

@@ -1,5 +1,5 @@
-//! The command line: `dynocar record`, `flight-recorder`, `keep` and `recover` become this program. It fails by wrong input,
-//! or by work that could not be done.
+//! The command line: `dynocar record`, `flight-recorder`, `keep` and `recover` become this program. It fails for wrong
+//! input, or for work that could not be done.
 
 mod record;
 
@@ -19,7 +19,7 @@ use dynocar_mcap::reading::FileEnding;
 
 pub use record::WantedArguments;
 
-/// Recordings of what a controller and the daemon write, as MCAP.
+/// Recordings of the samples and snapshots of controller and daemon, as MCAP.
 #[derive(Debug, Parser)]
 #[command(name = "dynocar", bin_name = "dynocar", version, about)]
 struct Arguments {

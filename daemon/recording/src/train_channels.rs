@@ -1,7 +1,7 @@
-//! Reader of the trains' channels for a recorder and a live view: one more reader, for which nobody waits.
+//! Reader of the trains' channels for a recorder and a live view: an additional reader, for which nobody waits.
 //!
-//! Samples are taken at least every few milliseconds, since a channel holds the newest 512 of them; those passed over are
-//! counted and reported. A [`Sink`] receives the rest.
+//! Samples are taken at least every few milliseconds, since a channel holds the newest 512 of them; samples that were
+//! missed are counted and reported. A [`Sink`] receives the others.
 
 use std::time::{Duration, Instant};
 
@@ -18,7 +18,7 @@ use dynocar_mcap::topic::Message;
 /// How long a reader sleeps between two looks at the channels: at 1 kHz a buffer of 512 samples
 /// leaves it a hundred times as long.
 pub const PAUSE: Duration = Duration::from_millis(5);
-/// How often it looks who is there.
+/// Time between two checks of who is there.
 const LOOK: Duration = Duration::from_millis(200);
 
 /// Selection of trains and pipelines to read.
@@ -26,7 +26,8 @@ const LOOK: Duration = Duration::from_millis(200);
 pub struct ChannelSelection {
     /// The trains.
     pub trains: observing::ObservedSelection,
-    /// A pipeline's snapshot is taken when the last is so old, or its status is another.
+    /// Least age of the last snapshot of a pipeline at which the next one is taken; one of another status is taken at
+    /// once.
     pub snapshot_interval: Duration,
 }
 
@@ -39,7 +40,7 @@ pub struct TrainChannels {
 }
 
 impl TrainChannels {
-    /// Opens the trains that were named; `name` is what the reader's places are called.
+    /// Opens the trains that were named; `name` identifies the reader's ports.
     ///
     /// # Errors
     ///
@@ -60,7 +61,7 @@ impl TrainChannels {
         self.channels.iter().map(TrainChannel::train)
     }
 
-    /// Hands on what has come, and looks from time to time who is there.
+    /// Passes on the new messages, and checks from time to time who is there.
     ///
     /// # Errors
     ///
@@ -89,7 +90,7 @@ impl TrainChannels {
     }
 }
 
-/// Where that goes what is read: into a recording, to viewers.
+/// Destination of the messages that are read: a recording, or viewers.
 pub trait Sink {
     /// Why nothing more is taken.
     type Error: From<ChannelError>;
@@ -131,7 +132,7 @@ struct TakenSnapshot {
     taken_ns: i64,
 }
 
-/// One train: its channels, and what was taken of it.
+/// One train: its channels, and the messages that were taken from them.
 pub struct TrainChannel {
     observed: ObservedTrain,
     samples: Receiver<TrainSample>,
@@ -149,7 +150,7 @@ pub struct TrainChannel {
 }
 
 impl TrainChannel {
-    /// Opens the channels of a train; `name` is what their place is called.
+    /// Opens the channels of a train; `name` identifies their ports.
     ///
     /// # Errors
     ///
@@ -181,7 +182,7 @@ impl TrainChannel {
         self.observed.id
     }
 
-    /// Hands on what has come.
+    /// Passes on the new messages.
     ///
     /// # Errors
     ///
@@ -229,7 +230,7 @@ impl TrainChannel {
         Ok(())
     }
 
-    /// Looks who is there, and reports what has changed; what one left who is gone comes before that.
+    /// Checks who is there, and reports the changes; the last messages of a peer that is gone come before that report.
     ///
     /// # Errors
     ///

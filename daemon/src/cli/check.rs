@@ -17,7 +17,7 @@ use crate::programs::{ErrorAnswer, WORKSHOP};
 
 pub use daemon::{DaemonAnswer, answer, read, report};
 
-/// Check a dataset, train, track or configuration, and report what was understood.
+/// Check a dataset, train, track or configuration, and report its content.
 #[derive(Clone, Debug, Args)]
 pub struct CheckArguments {
     /// A dataset's folder or its dataset.toml, a recording, a train.toml, a track.toml or a daemon.toml.
@@ -33,7 +33,7 @@ pub struct CheckArguments {
     pub draw: Option<PathBuf>,
 }
 
-/// The answer of `dynocar check --json`, whatever was checked.
+/// The answer of `dynocar check --json`, for every kind of file.
 #[derive(Debug, Serialize)]
 pub struct CheckAnswer<C> {
     /// Checked path.
@@ -105,7 +105,7 @@ pub fn or_refused<T>(
 ) -> Result<T, Failure> {
     if let Err(failure) = &result
         && let (Some(file), Some(error)) = (json, failure.answer())
-        // The exit status is that of what is wrong with the input.
+        // The exit status is that of the input's error.
         && let Err(error) = write_json(file, &refusal(path, error))
     {
         report_line(&format!("dynocar: {error}"));

@@ -1,4 +1,4 @@
-//! Commands that programs of their own carry out.
+//! Commands that separate programs carry out.
 
 use std::ffi::OsString;
 use std::os::unix::process::CommandExt;
@@ -8,7 +8,7 @@ use clap::Args;
 use super::Failure;
 use crate::programs::{call, not_started};
 
-/// Arguments after a command whose program reads them itself.
+/// Arguments after a command that a separate program reads itself.
 #[derive(Debug, Args)]
 #[command(disable_help_flag = true)]
 pub struct Passed {

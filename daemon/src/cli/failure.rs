@@ -11,7 +11,7 @@ use crate::dataset::LoadError;
 use crate::output::{OutputError, report_line, require_file, write_json};
 use crate::programs::{ErrorAnswer, ErrorDocument};
 
-/// Why a command ended without a result; says which exit status follows.
+/// Why a command ended without a result; determines the exit status.
 #[derive(Debug)]
 pub enum Failure {
     /// The command line or an input file is wrong: exit status 2.
@@ -27,12 +27,12 @@ pub enum Failure {
 }
 
 impl Failure {
-    /// Work that failed, by what went wrong.
+    /// Returns a failure of the work, in the words of an error.
     pub fn work(error: impl Display) -> Self {
         Failure::Work(error.to_string())
     }
 
-    /// Returns a wrong input, by what is wrong with it.
+    /// Returns a failure of the input, in the words of an error.
     pub fn input(error: impl Display) -> Self {
         Failure::Input(error.to_string())
     }

@@ -1,5 +1,5 @@
-//! The commands of `dynocar`, one file each. What is not needed beside a controller, the workshop and
-//! other programs carry out; a user calls them all by this name.
+//! The commands of `dynocar`, one file each. The workshop and other programs carry out the commands that are not needed
+//! next to a controller; a user calls them all by this name.
 //!
 //! Messages for people go to standard error, results to standard output. Exit status: 0 done,
 //! 1 the work failed, 2 the command line or an input file is wrong; `health` has some of its own.
@@ -36,8 +36,8 @@ struct Arguments {
     command: Command,
 }
 
-/// In the order of the help; what `Passed` follows is another program's, whose help says the same in
-/// one line (`tests/e2e/two_programs.rs`).
+/// In the order of the help. A command with `Passed` is carried out by another program, whose help has the same line
+/// (`tests/e2e/two_programs.rs`).
 #[derive(Debug, Subcommand)]
 enum Command {
     Demo(demo::DemoArguments),
@@ -64,9 +64,9 @@ enum Command {
     /// Turn recorded runs into candidate models, while trains run.
     Learn(Passed),
     Models(models::ModelsArguments),
-    /// Record what a controller and the daemon write, as MCAP
+    /// Record the samples and snapshots of controller and daemon, as MCAP
     Record(Passed),
-    /// Keep the last hours on disk, and for good what lies around a suspicion or a fault
+    /// Keep the last hours on disk, and for good the minutes around a suspicion or a fault
     FlightRecorder(Passed),
     /// Ask a flight recorder to keep this moment for good
     Keep(Passed),
@@ -74,7 +74,7 @@ enum Command {
     Recover(Passed),
     /// Convert recordings between MCAP, CSV datasets and Parquet
     Convert(Passed),
-    /// Show in the terminal what is estimated of a train, and what to drive next
+    /// Show in the terminal the estimates of a train, and which manoeuvre to drive next
     Watch(Passed),
     /// Serve samples, snapshots and events live to Foxglove or Lichtblick
     Live(Passed),
@@ -117,7 +117,7 @@ impl Command {
         }
     }
 
-    /// Returns where machines want the result; `check` has an answer of its own for what is wrong.
+    /// Returns the file for the result as JSON; `check` writes its own answer for errors.
     fn json(&self) -> Option<&Path> {
         match self {
             Command::Demo(arguments) => arguments.json.as_deref(),

@@ -43,9 +43,9 @@ pub struct ModelsArguments {
 /// A model is named by its hash or the beginning of it, or as `in-force` or `declared`.
 #[derive(Debug, Subcommand)]
 enum ModelsCommand {
-    /// All models of a train: when they were made, what they are, what they add
+    /// All models of a train: when they were made, their state, and the effects that they add
     List,
-    /// Where a model came from and what it adds, with 95 % intervals
+    /// Where a model came from and which effects it adds, with 95 % intervals
     Show {
         /// The model's hash, the beginning of it, in-force or declared
         model: String,
@@ -177,7 +177,7 @@ fn found<'h>(history: &'h ModelHistory, name: &str) -> Result<&'h (Stored, State
         (Some(_), Some(_)) if name != "declared" => {
             Err(Failure::Input(format!("{name}: several models begin so: give more of the hash")))
         }
-        // Of what was declared the newest is meant.
+        // Of several declared models the newest is meant.
         (Some(model), _) => Ok(model),
         (None, _) => {
             Err(Failure::Input(format!("{name}: no such model; `dynocar models list` names them")))
@@ -281,7 +281,7 @@ fn trial(trials: &TrialRecord, hash: ModelHash) -> String {
     text
 }
 
-/// Returns a model's error over that of the one in force, with what speaks for it.
+/// Returns a model's error over that of the model in force, with the evidence for it.
 fn compared(tried: &TriedModel) -> String {
     let (trips, e_value) = (tried.evidence.trips(), tried.evidence.e_value());
     let evidence = if e_value < 1e4 { short(e_value, 1) } else { format!("{e_value:.0e}") };

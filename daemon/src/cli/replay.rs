@@ -32,7 +32,7 @@ pub struct ReplayArguments {
     /// Play nothing: compute every snapshot of a recording again and say whether each bit is the same
     #[arg(long, conflicts_with_all = ["run", "rate", "train", "wait"])]
     verify: bool,
-    /// With --verify: also say what another configuration of the daemon would have estimated
+    /// With --verify: also report the estimates of another configuration of the daemon
     #[arg(long, value_name = "FILE", requires = "verify")]
     with: Option<PathBuf>,
     /// Only this run, counted from 1
@@ -74,7 +74,7 @@ fn needs_workshop(path: &Path) -> bool {
     is_recording || dataset::open(path).is_ok_and(|(_, head)| has_parquet(&head))
 }
 
-/// Plays the runs of what a function reads.
+/// Plays the runs of the dataset that a function reads.
 ///
 /// # Errors
 ///
@@ -132,7 +132,7 @@ pub fn execute(
     )))
 }
 
-/// Reads what is played. The only train of a recording may be played as another.
+/// Reads the dataset to play. The only train of a recording may be played as another.
 fn of_train(
     path: &Path,
     train: Option<TrainId>,

@@ -1,4 +1,4 @@
-//! Estimators that now and then compute for long, and the configuration lines that give others a thread of their own.
+//! Estimators that compute for long now and then, and the configuration lines that give others a thread of their own.
 
 use dynocar_shared::PipelineKind;
 

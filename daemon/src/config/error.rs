@@ -7,7 +7,7 @@ use dynocar_dataset::FileProblem;
 /// Why a configuration is refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
-    /// The file's text cannot be had.
+    /// The file's text cannot be read.
     #[error("{path}: {problem}")]
     Unreadable {
         /// The file.

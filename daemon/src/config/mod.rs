@@ -28,7 +28,7 @@ impl DaemonConfig {
     ///
     /// # Errors
     ///
-    /// See [`ConfigError`]; every message names the file and what was expected.
+    /// See [`ConfigError`]; every message names the file and the expected value.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
         let text = read_text(path)
             .map_err(|problem| ConfigError::Unreadable { path: path.into(), problem })?;

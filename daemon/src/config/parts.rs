@@ -1,4 +1,4 @@
-//! The parts of a configuration: process, threads, pipelines, what is kept.
+//! The parts of a configuration: process, threads, pipelines, kept states.
 
 use std::path::PathBuf;
 
@@ -12,9 +12,9 @@ use crate::shadow::rule::Rule;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum IdleStrategy {
-    /// Looks for samples without pause: lowest latency, one whole core.
+    /// Polls for samples without pause: lowest latency, one whole core.
     Busy,
-    /// Looks for a while, then sleeps until the controller wakes it.
+    /// Polls for a while, then sleeps until the controller wakes it.
     Adaptive,
     /// Sleeps at once: least processor time.
     Event,
@@ -40,7 +40,7 @@ pub enum LogFormat {
     Json,
 }
 
-/// The process: what `[daemon]` says.
+/// The process: the table `[daemon]`.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ProcessConfig {
@@ -99,12 +99,12 @@ impl Default for StateConfig {
     }
 }
 
-/// Returns how often what outlives the daemon is written, in s.
+/// Returns the interval in s at which the states that outlive the daemon are written.
 pub(super) const fn default_interval_s() -> u64 {
     30
 }
 
-/// The store of models, and what becomes of those on trial.
+/// The store of models, and the treatment of models on trial.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelsConfig {
     /// The store's directory.

@@ -14,8 +14,8 @@ pub struct Answers {
 }
 
 impl Answers {
-    /// Settles who answers for a train: the pipeline named for the train, else the one named for
-    /// all trains, else the best measured one that serves the train.
+    /// Determines who answers for a train: the pipeline named for the train, else the one named for all trains, else
+    /// the best measured one that serves the train.
     ///
     /// # Errors
     ///

@@ -20,13 +20,13 @@ pub struct TrainConfig {
     pub model: Arc<TrainModel>,
     /// The line it runs on, when known.
     pub track: Option<Arc<Track>>,
-    /// By what that model of train and line is known.
+    /// Hash that identifies the model of train and line.
     pub model_hash: ModelHash,
     /// Text of the declared model, as its files spell it.
     pub text: ModelText,
     /// The models to be tried next to the one in force; those of the store when absent.
     pub candidates: Option<Vec<ModelHash>>,
-    /// Which wheels it runs on; estimates are not kept across a change. Empty when not given.
+    /// Set of wheels that the train runs on; estimates are not kept across a change. Empty when not given.
     pub wheel_set: String,
     /// The pipelines that answer a controller's questions, each by its number.
     pub answers: Answers,
@@ -45,7 +45,7 @@ pub struct DaemonConfig {
     pub metrics: Option<SocketAddr>,
     /// Estimates that outlive the daemon; none are kept when absent.
     pub state: Option<StateConfig>,
-    /// The store of models; without it what is declared stays in force.
+    /// The store of models; without it the declared model stays in force.
     pub models: Option<ModelsConfig>,
     /// The pipelines, by the number that their snapshots carry.
     pub pipelines: Vec<PipelineConfig>,

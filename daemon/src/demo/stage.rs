@@ -1,4 +1,4 @@
-//! The recorded runs that the program carries; the demo's processes and files, all gone when it is over.
+//! The recorded runs that the program carries, and the demo's processes and files, which are all gone when it is over.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use dynocar_transport::{ChannelError, Host};
 use rustix::process::{Pid, Signal, kill_process};
 use tempfile::TempDir;
 
-/// Why a process or file could not be had.
+/// Why a process cannot be started or a file cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum StageError {
     /// The system refused.
@@ -131,7 +131,7 @@ impl Stage {
     ///
     /// # Errors
     ///
-    /// With what it said.
+    /// With the words of the daemon's log.
     pub fn require_daemon(&mut self) -> Result<(), StageError> {
         let status = match &mut self.daemon {
             Some(daemon) => daemon.try_wait().map_err(system("looking after the daemon"))?,

@@ -1,4 +1,4 @@
-//! Findings of the demo, and the time of a snapshot from its sample's publishing to its own.
+//! Findings of the demo, and the time between the publishing of a sample and that of its snapshot.
 
 use dynocar_client::SnapshotReader;
 use dynocar_dataset::Dataset;
@@ -13,9 +13,9 @@ use serde::Serialize;
 pub struct DemoAnswer {
     /// Each pipeline with its status.
     pub pipelines: Vec<PipelineAnswer>,
-    /// Counts of the samples, for the pipeline that fared worst.
+    /// Counts of the samples, for the pipeline that used the fewest.
     pub samples: SampleAnswer,
-    /// From a sample's publishing to its snapshot's.
+    /// Time between the publishing of a sample and that of its snapshot.
     pub latency: LatencyAnswer,
 }
 
@@ -24,7 +24,7 @@ pub struct DemoAnswer {
 pub struct PipelineAnswer {
     /// The estimator's name.
     pub name: &'static str,
-    /// The quantities that it answers a controller for: the recommended pipeline for each.
+    /// The quantities for which it is the recommended pipeline.
     pub answers: Vec<&'static str>,
     /// Its status at the end.
     pub status: &'static str,

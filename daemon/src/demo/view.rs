@@ -1,4 +1,4 @@
-//! The live view: one line a pipeline, a bar for the runs; plain lines without a terminal.
+//! The live view: one line for each pipeline, a bar for the runs; plain lines without a terminal.
 
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
@@ -20,7 +20,7 @@ const BAR_LETTERS: usize = 40;
 /// Shows the estimates as they come.
 pub struct DemoView {
     total: u64,
-    /// On a terminal.
+    /// Drawing on the terminal; `None` without a terminal.
     redrawn: Option<Redrawn>,
     last_plain: Option<Instant>,
 }
@@ -38,7 +38,7 @@ impl DemoView {
         DemoView { total, redrawn, last_plain: None }
     }
 
-    /// Shows what the reader knows.
+    /// Shows the newest snapshots of the reader.
     pub fn draw(&mut self, reader: &SnapshotReader, now_ns: i64) {
         match &mut self.redrawn {
             Some(redrawn) => redrawn.draw(&lines(reader, now_ns, self.total)),

@@ -1,4 +1,4 @@
-//! Who put which model in force, who took it back, and what follows from that.
+//! Decisions on models: who put which model in force, who took it back, and the resulting model in force.
 
 use dynocar_model::named;
 use serde::{Deserialize, Serialize};
@@ -11,11 +11,11 @@ named! {
     #[derive(Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
     Action ("as in the files") {
-        /// It is put in force.
+        /// The model is put in force.
         Adopted "adopted";
         /// The model in force is withdrawn; its predecessor is in force again.
         RolledBack "rolled_back";
-        /// It is not wanted: it is no candidate any more.
+        /// The model is not wanted: it is no candidate any more.
         Rejected "rejected";
     }
 }
@@ -25,11 +25,10 @@ named! {
 pub struct Decision {
     /// Decided action.
     pub action: Action,
-    /// The model that was adopted or rejected, or that a rollback put in force again; absent for what
-    /// the configuration declares.
+    /// The model that was adopted or rejected, or that a rollback put in force again; absent for the declared model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<ModelHash>,
-    /// The model in force before; absent for what the configuration declares.
+    /// The model in force before; absent for the declared model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub from: Option<ModelHash>,
     /// Who decided: a person's name, or `rule`.
@@ -58,14 +57,14 @@ pub struct NewDecision {
 pub enum ModelChoice {
     /// Put a model of the store in force.
     Adopt(ModelHash),
-    /// Put in force again what was so before the model that is.
+    /// Put the predecessor of the model in force in force again.
     RollBack,
     /// Strike a model of the store off the candidates.
     Reject(ModelHash),
 }
 
-/// Returns the models in force after some decisions, the present one last, each on top of what it replaced;
-/// empty while nothing but the configuration's declaration is in force.
+/// Returns the models in force after some decisions, the present one last, each after its predecessor; empty while
+/// nothing but the configuration's declaration is in force.
 pub fn in_force_after<'d>(decisions: impl IntoIterator<Item = &'d Decision>) -> Vec<ModelHash> {
     let mut stack = Vec::new();
     for decision in decisions {

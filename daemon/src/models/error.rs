@@ -22,7 +22,7 @@ pub enum ModelsError {
         /// Why not.
         problem: FileProblem,
     },
-    /// A file of the store is not what the store writes.
+    /// A file of the store is not of the form that the store writes.
     #[error("{path}: no record of a store of models: {message}")]
     Malformed {
         /// The file.
@@ -49,7 +49,7 @@ pub enum ModelsError {
         /// The train.
         train: TrainId,
     },
-    /// The model is what it would become.
+    /// The model is in force already.
     #[error("model {hash} is in force already")]
     InForce {
         /// The model.

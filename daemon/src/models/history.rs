@@ -11,17 +11,17 @@ use super::text::ModelHash;
 named! {
     /// State of a model.
     State ("in words") {
-        /// It is in force.
+        /// The model is in force.
         InForce "in force";
-        /// It grew from the model in force, and nothing was decided on it.
+        /// The model grew from the model in force, and no decision on it was taken.
         Candidate "candidate";
-        /// It was in force.
+        /// The model was in force.
         Earlier "earlier";
-        /// It is not wanted.
+        /// The model is not wanted.
         Rejected "rejected";
-        /// Somebody declared it, and it is not in force.
+        /// Somebody declared the model, and it is not in force.
         Declared "declared";
-        /// It grew from a model that is not in force.
+        /// The model grew from a model that is not in force.
         Aside "aside";
     }
 }
@@ -29,7 +29,7 @@ named! {
 /// All that the store holds of a train.
 #[derive(Clone, Debug)]
 pub struct ModelHistory {
-    /// The models, the oldest first, each with what it is.
+    /// The models, the oldest first, each with its state.
     pub models: Vec<(Stored, State)>,
     /// Entries among them that are not decisions.
     pub left_out: Vec<(std::path::PathBuf, String)>,

@@ -8,8 +8,8 @@
 //! models/1/events/000001.toml …             maintenance events of certain runs
 //! ```
 //!
-//! Whatever dies, a process or the power: a model is there as a whole or not at all, and two writers
-//! never take the same number.
+//! Even if a process dies or the power fails, a model is there as a whole or not at all, and two writers never take the
+//! same number.
 //!
 //! # Layout
 //!
@@ -17,10 +17,10 @@
 //! - [`moment`]: a time in UTC
 //! - [`origin`]: where a model came from; maintenance events
 //! - [`numbered`]: records with numbers: decisions, events
-//! - [`decision`]: what was decided, and what follows from it
+//! - [`decision`]: decisions on models, and the resulting model in force
 //! - [`store`]: the directory
-//! - [`history`]: what each model is now
-//! - [`difference`]: in which keys two models differ
+//! - [`history`]: the present state of each model
+//! - [`difference`]: the keys in which two models differ
 
 pub mod decision;
 pub mod difference;

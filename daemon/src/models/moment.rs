@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use time::format_description::well_known::Rfc3339;
 use time::{OffsetDateTime, PrimitiveDateTime};
 
-/// A second of UTC, written as RFC 3339 has it: `2026-11-23T05:20:00Z`.
+/// A second of UTC, written as in RFC 3339: `2026-11-23T05:20:00Z`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct UtcSecond {
@@ -22,7 +22,7 @@ pub struct UtcSecond {
 pub struct NoMoment(String);
 
 impl UtcSecond {
-    /// Returns the second in which an instant lies; the first of 1970 for one before.
+    /// Returns the second in which an instant lies; the first second of 1970 for an instant before it.
     pub fn from_time(instant: SystemTime) -> Self {
         UtcSecond { unix_s: instant.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs()) }
     }
@@ -37,7 +37,7 @@ impl UtcSecond {
         self.in_calendar().date().to_string()
     }
 
-    /// Returns the end of the year 9999 for what is later: a clock that is wrong is no fault of ours.
+    /// Returns the end of the year 9999 for later times: a wrong clock must not end the program.
     fn in_calendar(self) -> OffsetDateTime {
         let unix_s = i64::try_from(self.unix_s).unwrap_or(i64::MAX);
         let last = PrimitiveDateTime::MAX.assume_utc();

@@ -14,7 +14,7 @@ use crate::storage::{Storage, part_of, write_once};
 /// A record with its number.
 pub type Numbered<T> = (u64, T);
 
-/// Returns the names in a folder, sorted; none for a folder that is not there.
+/// Returns the names in a folder, sorted; an empty list where there is no such folder.
 pub(super) fn names_in(folder: &Path) -> Result<Vec<String>, ModelsError> {
     let failed = |error: std::io::Error| ModelsError::Unreadable {
         path: folder.into(),
@@ -49,7 +49,7 @@ pub(super) fn read_record<T: DeserializeOwned>(path: &Path) -> Result<T, ModelsE
 ///
 /// # Errors
 ///
-/// When one cannot be read: what follows from the others would be another history.
+/// When one cannot be read: the others alone would give another history.
 pub fn read_all<T: DeserializeOwned>(folder: &Path) -> Result<Vec<Numbered<T>>, ModelsError> {
     let mut records = Vec::new();
     for name in names_in(folder)? {

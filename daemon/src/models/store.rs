@@ -121,7 +121,7 @@ impl TrainModels {
     ///
     /// # Errors
     ///
-    /// When it cannot be written, or what is there under its name is another.
+    /// When it cannot be written, or its name is taken by another model.
     pub fn put(&self, model: &NewModel) -> Result<ModelHash, ModelsError> {
         let hash = model.text.hash();
         let folder = self.folder_of(hash);
@@ -137,7 +137,8 @@ impl TrainModels {
         }
     }
 
-    /// Puts what a configuration declares into the store, so that what grows from it has a parent there.
+    /// Puts the model that a configuration declares into the store, so that models that grow from it have a parent
+    /// there.
     ///
     /// # Errors
     ///
@@ -222,7 +223,7 @@ impl TrainModels {
         numbered::read_all(&self.folder.join(DECISIONS))
     }
 
-    /// Returns the model in force after the last decision; `None` for what the configuration declares.
+    /// Returns the model in force after the last decision; `None` for the declared model.
     ///
     /// # Errors
     ///
@@ -236,8 +237,7 @@ impl TrainModels {
     ///
     /// # Errors
     ///
-    /// When nobody takes it, the model is not in the store or what it would become already, or the
-    /// decision cannot be written.
+    /// When no name is given, the model is not in the store or in force already, or the decision cannot be written.
     pub fn decide(&self, new: &NewDecision) -> Result<u64, ModelsError> {
         if new.by.trim().is_empty() {
             return Err(ModelsError::NoName);
@@ -249,7 +249,7 @@ impl TrainModels {
             if numbered::write(&Disk, &self.folder.join(DECISIONS), number, &decision)? {
                 return Ok(number);
             }
-            // Somebody else decided meanwhile: what was to be decided is looked at anew.
+            // Somebody else decided meanwhile: the decision is checked anew.
         }
     }
 

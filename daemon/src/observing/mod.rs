@@ -20,8 +20,8 @@ pub struct ObservedSelection {
 }
 
 impl ObservedSelection {
-    /// Returns the trains beside those that are known for which somebody holds one of these roles by now; none where
-    /// trains were named.
+    /// Returns the trains, in addition to the known ones, for which somebody now holds one of these roles; none where
+    /// the selection names trains.
     ///
     /// # Errors
     ///

@@ -1,5 +1,5 @@
-//! One train as an observer sees it: who serves and drives it, the reader of its snapshots, the state of its pipelines, and
-//! the kinds of events.
+//! One train as an observer sees it: who serves and drives it, the reader of its snapshots, the state of its pipelines,
+//! and the kinds of events.
 
 use dynocar_client::{Reading, SnapshotReader};
 use dynocar_shared::services::PIPELINES_MAX;
@@ -101,7 +101,7 @@ impl ObservedTrain {
         self.reader.iter().flat_map(move |reader| reader.readings(now_ns))
     }
 
-    /// Takes what has come; gives what has changed about the pipelines.
+    /// Takes the new snapshots; returns the changes of the pipelines.
     pub fn poll(&mut self) -> Vec<TrainChange> {
         let mut changes = Vec::new();
         let Some(reader) = &mut self.reader else { return changes };

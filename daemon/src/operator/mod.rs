@@ -1,5 +1,5 @@
-//! Texts for an operator, wherever they stand: in the log, in `dynocar health`, on the screen of `dynocar watch`
-//! and in a recording's events; the effect that a model may lack among them.
+//! Texts for an operator, for every place where they are shown: the log, `dynocar health`, the screen of `dynocar
+//! watch` and a recording's events; among them the effect that a model may lack.
 //!
 //! The remedy is in [`dynocar_core::remedy`] and [`dynocar_shared::vocabulary::KINDS`].
 
@@ -9,7 +9,7 @@ use dynocar_shared::snapshot::REJECTION_REASONS;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{HALF_95, ParameterSnapshot, PipelineKind, RejectionReason};
 
-/// Returns the name of a pipeline that no configuration names: its number there and its kind.
+/// Returns the name of a pipeline without a configured name: its number in the configuration and its kind.
 pub fn pipeline_name(index: u32, kind: Option<PipelineKind>) -> String {
     format!("{index}_{}", kind.map_or("unknown", PipelineKind::name))
 }

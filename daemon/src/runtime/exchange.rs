@@ -1,9 +1,9 @@
-//! Pipelines that change places: those of another model go to work, those at work come back.
+//! Exchange of pipelines: those of another model go to work, and those at work come back.
 //!
-//! One thread, the shadow's, hands over the pipelines of a train for all threads that serve it; each
-//! of them takes its own when the train stands, between two samples, and gives its old ones
-//! back. The first that sees the train stand settles the sample after which all of them change,
-//! so that they agree, and none waits for another. Nobody locks and nobody allocates.
+//! One thread, the shadow's, hands over the pipelines of a train for all threads that serve it. Each of these takes its
+//! own when the train stands, between two samples, and gives its old ones back. The first thread that sees the train
+//! stand settles the number of the sample after which all of them change, so that they agree and no thread waits for
+//! another. No thread locks or allocates.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -13,12 +13,12 @@ use dynocar_core::pipeline::Pipeline;
 /// The pipelines of one train on one thread, in the order of its slots.
 pub type Set = Vec<Pipeline>;
 
-/// No thread has settled a sample yet.
+/// No thread has settled the sample yet.
 const OPEN: u64 = u64::MAX;
 /// Mark of a value that is being withdrawn.
 const WITHDRAWN: u64 = u64::MAX - 1;
 
-/// The way there and back for the pipelines of one train.
+/// The way to the threads and back for the pipelines of one train.
 #[derive(Debug)]
 pub struct Exchange {
     /// Number of the sample after which to change, [`OPEN`] or [`WITHDRAWN`].
@@ -26,7 +26,7 @@ pub struct Exchange {
     seats: Vec<Seat>,
 }
 
-/// One thread's part.
+/// One thread's part of the exchange.
 struct Seat {
     inbox: ArrayQueue<Set>,
     outbox: ArrayQueue<Set>,
@@ -45,7 +45,7 @@ impl Exchange {
         Exchange { settled: AtomicU64::new(WITHDRAWN), seats: (0..seats).map(seat).collect() }
     }
 
-    /// Hands over one set for each thread. What was handed over before must be back.
+    /// Hands over one set for each thread. All sets handed over before must be back.
     ///
     /// # Panics
     ///
@@ -59,7 +59,7 @@ impl Exchange {
         self.settled.store(OPEN, Ordering::Release);
     }
 
-    /// Takes back what was handed over, unless a thread has begun to change; `None` then.
+    /// Takes back the sets handed over; `None` when a thread has begun to change.
     pub fn withdraw(&self) -> Option<Vec<Set>> {
         let (now, then) = (OPEN, WITHDRAWN);
         self.settled.compare_exchange(now, then, Ordering::AcqRel, Ordering::Acquire).ok()?;
@@ -97,7 +97,7 @@ impl Exchange {
     ///
     /// Allocates nothing, locks nothing.
     pub fn give_back(&self, seat: usize, old: Set) {
-        // The place is free: whoever handed over waits for what was there before.
+        // The place is free: the thread that hands over waits for the return of the set before.
         let _ = self.seats[seat].outbox.push(old);
     }
 }

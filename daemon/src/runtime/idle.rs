@@ -6,7 +6,7 @@ use dynocar_transport::channel::Sleeper;
 
 use crate::config::IdleStrategy;
 
-/// Decides, between two looks for samples, whether to look again at once or to sleep.
+/// Decides, between two polls for samples, whether to poll again at once or to sleep.
 pub struct Idler {
     spin_ns: i64,
     last_work_ns: i64,
@@ -16,7 +16,7 @@ pub struct Idler {
 }
 
 impl Idler {
-    /// Returns an idler; `sleeper` is the thread's bed, unless it never sleeps.
+    /// Returns an idler; `sleeper` puts the thread to sleep, unless it never sleeps.
     pub fn new(
         strategy: IdleStrategy,
         spin_us: u64,

@@ -19,12 +19,12 @@ use crate::observing::ObservedTrain;
 use crate::operator::{Suspicion, refusals, refused_words};
 use crate::supervision::health::Verdict;
 
-/// How often the main thread looks around.
+/// Time between two rounds of the main thread.
 const ROUND: Duration = Duration::from_millis(100);
-/// Rounds between two looks at who drives the trains.
+/// Rounds between two checks of who drives the trains.
 const ROUNDS_PER_PEER_CHECK: u32 = 4;
 
-/// A pipeline with the name it is logged under.
+/// A pipeline with its name in the log.
 pub struct WatchedPipeline {
     /// The pipeline's name.
     pub name: String,
@@ -56,7 +56,7 @@ struct TrainLog {
     controller: Option<Option<Announcement>>,
 }
 
-/// Watches signals, peers, snapshots and tallies, and writes what changes into the log.
+/// Watches signals, peers, snapshots and tallies, and logs the changes.
 pub struct RuntimeWatch {
     host: Host,
     /// Start of the daemon, by which its snapshots differ from those of one before it.
@@ -166,7 +166,7 @@ impl RuntimeWatch {
 impl TrainLog {
     /// Looks who drives the train, logs a change, and opens the snapshots unless they are read already.
     fn look(&mut self, host: &Host) -> Result<(), ChannelError> {
-        // Before the look: what was begun by then is over when nobody is there.
+        // Before the look: all that had begun by then has ended when no controller is there.
         let begun = self.count.begun();
         let seen = match Peer::look_up(host, self.id, Role::Controller)? {
             Peer::Absent => {
@@ -194,7 +194,7 @@ impl TrainLog {
 }
 
 impl PipelineLog {
-    /// Logs what is new of what no snapshot carries.
+    /// Logs news that no snapshot carries.
     fn report_tally(&mut self, reported: &mut Vec<(TrainId, InputFault)>) {
         let reading = self.pipeline.tally.read();
         let (name, train) = (self.pipeline.name.as_str(), self.pipeline.train);
@@ -212,7 +212,7 @@ impl PipelineLog {
         self.last = reading;
     }
 
-    /// Logs what is new of a pipeline's status, of what it lost and of what it suspects.
+    /// Logs news of a pipeline's status, its lost samples and its suspicion.
     fn report(&mut self, snapshot: &ParameterSnapshot, now: Instant) {
         let (pipeline, train) = (self.pipeline.name.as_str(), self.pipeline.train.0);
         if let Some(untold) = self.statuses.look((snapshot.status, snapshot.reason), now) {

@@ -1,11 +1,11 @@
 //! The threads of the daemon.
 //!
 //! - [`worker`]: a pipeline thread, from sample to snapshot
-//! - [`exchange`]: pipelines of another model on their way to a thread, and the old ones back
+//! - [`exchange`]: pipelines of another model on their way to a thread, and the old ones on their way back
 //! - [`idle`]: idle strategies while no sample comes
-//! - [`system`]: its requests to the system: a core, a real-time priority, resident memory
-//! - [`status_log`]: which changes of status and suspicion the log reports, which refused samples it names
-//! - [`tally`]: its reports to the main thread, for which neither waits
+//! - [`system`]: the requests of a thread to the system: a core, a real-time priority, resident memory
+//! - [`status_log`]: which changes of status and suspicion, and which refused samples, the log reports
+//! - [`tally`]: the reports of a pipeline thread to the main thread, for which neither waits
 //! - [`main_thread`]: the work of the main thread: signals, peers, the log
 
 pub mod exchange;

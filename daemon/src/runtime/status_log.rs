@@ -1,10 +1,10 @@
 //! Changes of a pipeline's status or suspicion, and refused samples of a train, that the log reports.
 //!
-//! A status that was not reported lately is reported at once. One that comes back is reported when it has
-//! stayed for a while, and the longer the more often it came back: an estimate at the edge of a
-//! threshold flips between two statuses for as long as it is there.
+//! A status that was not reported lately is reported at once. A status that comes back is reported only after it has
+//! stayed for a while, which grows with each return: an estimate at the edge of a threshold flips between two statuses
+//! for as long as it is there.
 //!
-//! The first refused samples are reported at once, those that follow together and not too often. Refusals that are normal,
+//! The first refused samples are reported at once, later ones together and not too often. Refusals that are normal, for
 //! wheel slide and the estimators' own outliers, are only counted.
 
 use std::time::{Duration, Instant};
@@ -18,14 +18,14 @@ use crate::operator::refusals;
 /// Status and reason by number.
 pub type StatusAndReason = (u32, u32);
 
-/// How long a status that comes back has to stay until it is reported, at first.
+/// Time for which a status that comes back has to stay until it is reported, at first.
 const STAY_MIN: Duration = Duration::from_secs(2);
-/// And at most; a status that was not reported for as long is a new one.
+/// Longest such time; a status that was not reported for as long counts as new.
 const STAY_MAX: Duration = Duration::from_secs(120);
-/// Statuses that are remembered.
+/// Number of statuses that are remembered.
 const REMEMBERED: usize = 8;
 
-/// The statuses of one pipeline as the log knows them.
+/// The statuses of one pipeline that the log has reported.
 #[derive(Clone, Debug)]
 pub struct StatusLog {
     /// Reported states, with the time at which each last held; the newest last.
@@ -98,7 +98,7 @@ impl StatusLog {
     }
 }
 
-/// How long what follows is gathered.
+/// Time over which later refusals are gathered.
 const GATHER: Duration = Duration::from_secs(60);
 
 /// The refused samples of one train as the log knows them.

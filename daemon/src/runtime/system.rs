@@ -1,5 +1,5 @@
-//! Requests of a thread to the system: resident memory, a core of its own, a place in the queue, files, and
-//! programs that do not outlive it.
+//! Requests of a thread to the system: resident memory, a core of its own, a real-time priority, files, and programs
+//! that end with it.
 
 use std::io::ErrorKind;
 use std::os::unix::process::CommandExt;
@@ -36,7 +36,7 @@ pub enum LockError {
     Refused(#[from] std::io::Error),
 }
 
-/// Locks all present and coming memory of the process, and keeps what is freed on the heap.
+/// Locks all present and future memory of the process, and keeps freed memory on the heap.
 ///
 /// # Errors
 ///
@@ -110,8 +110,8 @@ pub fn stand_back() {
     unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, NICENESS) };
 }
 
-/// Lets a program end when the thread that starts it does, whatever ends that: nothing goes on that nobody
-/// waits for.
+/// Lets a program end when the thread that starts it ends for any reason, so that no program goes on without somebody
+/// who waits for it.
 pub fn ends_with_this(command: &mut Command) -> &mut Command {
     let parent = getpid();
     // SAFETY: between fork and exec only system calls are made.

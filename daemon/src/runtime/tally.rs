@@ -1,4 +1,5 @@
-//! Counts that a pipeline thread reports to the main thread beside its snapshots, without waiting on either side.
+//! Counts that a pipeline thread reports to the main thread in addition to its snapshots, without waiting on either
+//! side.
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -16,7 +17,7 @@ struct Counters {
     beats: AtomicU64,
     unsent: AtomicU64,
     implausible: AtomicU64,
-    /// Where the train is, in m.
+    /// Position of the train in m.
     position_m: AtomicU64,
 }
 
@@ -27,7 +28,7 @@ pub struct TallyReading {
     pub beats: u64,
     /// Snapshots that the transport did not take.
     pub unsent: u64,
-    /// Recent impossibilities of the samples; a snapshot has the reason alone.
+    /// Recent input fault of the samples, with its factor; a snapshot carries only the reason.
     pub implausible: Option<DetectedFault>,
     /// Where the train is, in m; no number where it does not know.
     pub position_m: f64,

@@ -14,8 +14,8 @@ use super::idle::Idler;
 use super::tally::Tally;
 use crate::config::{IdleStrategy, ThreadConfig};
 
-/// A thread that never found a sample looks this many times before it reads the clock: the clock takes as long as a
-/// look, and a sample that comes meanwhile would wait for it.
+/// Polls of a thread that finds no sample between two readings of the clock: a reading takes as long as a poll, and a
+/// sample that comes meanwhile would wait for it.
 const LOOKS_PER_CLOCK: usize = 16;
 
 /// Samples that one train may take in a row before the thread's other trains have their turn.
@@ -187,10 +187,10 @@ impl TrainChannel {
         self.found.take().or_else(|| self.receiver.receive())
     }
 
-    /// When nobody drives the train any more, counts as lost what the last one published and no
-    /// port kept.
+    /// When nobody drives the train any more, counts as lost the samples that the last controller published and no port
+    /// kept.
     fn count_leftovers(&mut self, epoch: u64, now_ns: i64) {
-        // Before the look for samples: what is on its way then comes first.
+        // Before the poll for samples: samples that are on their way then come first.
         let Some(ended) = self.count.ended() else { return };
         self.found = self.next();
         if self.found.is_some() {
@@ -255,7 +255,7 @@ fn open_channel_of(
 ) -> Result<TrainChannel, ChannelError> {
     // Before the first snapshot: who reads that may publish at once, and loses nothing.
     let receiver = transport.receiver::<TrainSample>(plan.train)?;
-    // After the port is open: what is published from now on can be received, and is counted.
+    // After the port is open: every sample published from now on can be received, and is counted.
     let counted_from = plan.count.sent();
     plan.count.note_taken(plan.index, counted_from);
     let slots = plan

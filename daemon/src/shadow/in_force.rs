@@ -9,12 +9,11 @@ use super::rule::Rule;
 use crate::config::{DaemonConfig, TrainConfig};
 use crate::models::{ModelHash, ModelsError, Store, TrainModels, UtcSecond};
 
-/// How far back it is looked what a model grew from.
+/// Most generations of models that a search for an ancestor goes back.
 const ANCESTORS_MAX: usize = 10_000;
 
-/// Puts what the configuration declares of each train into the store, and gives each train the model
-/// that the store's decisions put in force. Where the store cannot be read, what is declared stays
-/// in force, and the log says why.
+/// Puts the declared model of each train into the store, and gives each train the model that the store's decisions put
+/// in force. Where the store cannot be read, the declared model stays in force, and the log says why.
 pub fn settle(config: &mut DaemonConfig) {
     let Some(models) = &config.models else { return };
     let store = Store::at(&models.directory);
@@ -65,7 +64,7 @@ pub enum NotInForce {
     },
 }
 
-/// Whether a model may come in force, whoever decided so.
+/// Checks whether a model may come in force, for decisions of persons and rules alike.
 ///
 /// # Errors
 ///

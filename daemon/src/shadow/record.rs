@@ -1,8 +1,8 @@
-//! Measurements of a train's trials: a file beside its models, which outlives the daemon, and the present figures in the
-//! metrics.
+//! Measurements of a train's trials: a file in the folder of its models, which outlives the daemon, and the present
+//! figures in the metrics.
 //!
-//! `trials.json` is replaced as a whole. A daemon that starts takes up the errors of each model, and
-//! what the trips said for a rival against the same model in force.
+//! `trials.json` is replaced as a whole. A daemon that starts takes up the errors of each model, and the evidence for a
+//! rival against the same model in force.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ use crate::storage::{Disk, Rights, StorageError, replace};
 
 /// The file, in a train's folder of the store.
 pub const TRIALS_FILE: &str = crate::models::store::TRIALS_FILE;
-/// Models of which errors are kept, those tried last.
+/// Number of models whose errors are kept: those tried last.
 const MODELS_MAX: usize = 32;
 
 /// Estimate of a rival's pipeline.
@@ -124,7 +124,7 @@ impl TrialRecord {
     ///
     /// # Errors
     ///
-    /// The system's answer; what was there stays.
+    /// The system's answer; the old file stays.
     pub fn write(&self, folder: &Path) -> Result<(), StorageError> {
         let text = serde_json::to_string_pretty(self).unwrap_or_default();
         let (path, beside): (PathBuf, PathBuf) =
@@ -137,7 +137,7 @@ impl TrialRecord {
         self.models.iter().find(|it| it.model == model)
     }
 
-    /// Takes over what models on trial show now; others stay as they were.
+    /// Takes over the present results of models on trial; others stay as they were.
     pub fn update(&mut self, in_force: ModelHash, now: Vec<TriedModel>) {
         self.in_force = Some(in_force);
         for tried in now {
@@ -199,7 +199,7 @@ pub struct Board {
 }
 
 impl Board {
-    /// Replaces what is pinned up of a train.
+    /// Replaces the published figures of a train.
     pub fn pin(&self, train: u64, models: Vec<TrialFigures>, events: &BTreeMap<String, u64>) {
         let mut pinned = self.pinned.lock().unwrap_or_else(PoisonError::into_inner);
         pinned.models.retain(|it| it.train != train);

@@ -1,4 +1,4 @@
-//! Rules for models on trial: selection, adoption, return, and the bounds that no model may leave.
+//! Rules for models on trial: selection, adoption, rollback, and the bounds that no model may leave.
 
 use std::collections::BTreeMap;
 
@@ -74,11 +74,11 @@ pub struct ModelStanding {
     pub in_force: ModelHash,
     /// Model in force before, to which a rollback leads; `None` for a model without a predecessor.
     pub before: Option<ModelHash>,
-    /// On trial: what was in force before, the model taken back last, and the candidates.
+    /// On trial: the model in force before, the model taken back last, and the candidates.
     pub rivals: Vec<ModelHash>,
 }
 
-/// Returns where a train's models stand; `declared` is what the configuration declares. At most
+/// Returns the standing of a train's models; `declared` is the model that the configuration declares. At most
 /// `candidates_max` candidates are on trial: those that the configuration names, else the newest.
 ///
 /// # Errors

@@ -15,11 +15,11 @@ use super::train::ShadowTrain;
 use crate::config::ModelsConfig;
 use crate::runtime::system::{pin_to_core, stand_back};
 
-/// How long it sleeps while samples gather; a channel holds more than come meanwhile.
+/// Time for which the thread sleeps while samples gather; a channel holds more than come meanwhile.
 const NAP: Duration = Duration::from_millis(20);
-/// How often it looks into the store.
+/// Time between two checks of the store.
 const LOOK: Duration = Duration::from_secs(1);
-/// A train of which no sample comes for so long is not driven.
+/// A train without a sample for this time is not driven.
 const SILENCE: Duration = Duration::from_secs(2);
 
 struct TrainChannel {

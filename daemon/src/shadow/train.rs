@@ -181,7 +181,7 @@ impl ShadowTrain {
         std::iter::once(figures(&self.trials.in_force, true)).chain(rivals).collect()
     }
 
-    /// Writes down what the trials show.
+    /// Writes the results of the trials into the record.
     pub fn write(&mut self, now: SystemTime) {
         let in_force = self.in_force();
         let against = |rival: &Rival| (rival.model != in_force.0).then_some(in_force);

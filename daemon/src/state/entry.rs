@@ -19,7 +19,7 @@ pub struct ModelKey {
     pub train: u64,
     /// The wheel set by the configuration; empty when it names none.
     pub wheel_set: String,
-    /// By what the model of train and line is known.
+    /// Hash that identifies the model of train and line.
     pub model: u64,
 }
 
@@ -121,7 +121,7 @@ impl StateContent {
         })
     }
 
-    /// Reads what [`StateContent::to_text`] wrote; `path` is the file it came from.
+    /// Reads the text that [`StateContent::to_text`] wrote; `path` is the file it came from.
     ///
     /// # Errors
     ///

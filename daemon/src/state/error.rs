@@ -43,7 +43,7 @@ pub enum StateProblem {
         /// Bytes there are.
         found: usize,
     },
-    /// The content is not what was written.
+    /// The content differs from the content that was written.
     #[error("corrupt: checksum {saved:016x} saved, {calculated:016x} calculated")]
     Corrupt {
         /// Checksum in the header.

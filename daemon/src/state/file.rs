@@ -21,7 +21,7 @@ const MAGIC: &str = "dynocar-state";
 /// Largest state file in bytes; a longer file is foreign.
 const BYTES_MAX: u64 = 1 << 20;
 
-/// 64-bit FNV-1a: finds torn and rotten bytes; it is no defence against forgery.
+/// 64-bit FNV-1a: detects incomplete and damaged content; it is no defence against forgery.
 pub fn checksum(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
@@ -88,7 +88,7 @@ pub fn replace(path: &Path, content: &str) -> Result<(), StateError> {
     replace_on(&Disk, path, content)
 }
 
-/// Replaces a state file as a whole for whoever comes after a process that died; not brought to the disk.
+/// Replaces a state file as a whole, for the daemon after a process that dies; does not bring it to the disk.
 ///
 /// # Errors
 ///

@@ -16,12 +16,12 @@ use crate::config::DaemonConfig;
 use crate::observing::ObservedTrain;
 use crate::stamp::Stamp;
 
-/// How often the keeper looks whether to stop.
+/// Time between two checks whether to stop.
 const ROUND: Duration = Duration::from_millis(50);
-/// How often what a daemon that dies at once leaves is written.
+/// Time between two writings of the state for a daemon that dies at once.
 const LEAVE_EVERY: Duration = Duration::from_secs(1);
 
-/// One train's state with the snapshots that it is kept from.
+/// One train's state with the snapshots from which it is made.
 struct KeptTrain {
     observed: ObservedTrain,
     content: StateContent,
@@ -41,8 +41,8 @@ pub struct StateKeeper {
 }
 
 impl StateKeeper {
-    /// Returns a keeper that writes into the directory so often; `stored` is what the trains' states held at the start,
-    /// by index of the train.
+    /// Returns a keeper that writes into the directory so often; `stored` holds the estimates in the trains' states at
+    /// the start, by index of the train.
     ///
     /// # Errors
     ///
@@ -73,7 +73,8 @@ impl StateKeeper {
         Ok(StateKeeper { directories, interval, pipelines, trains, stop })
     }
 
-    /// Writes what is validated, every so often and at the end, when nothing is left in the run-time directory.
+    /// Writes the validated estimates, every so often and at the end, when the copies in the run-time directory are
+    /// removed.
     pub fn run(&mut self) {
         let (mut last, mut left) = (Instant::now(), Instant::now());
         while !self.stop.load(Ordering::Relaxed) {
@@ -108,7 +109,7 @@ impl StateKeeper {
             for reading in train.observed.readings(now_ns) {
                 let index = reading.snapshot.pipeline_index as usize;
                 if reading.snapshot.model_hash != train.content.key.model {
-                    // Another model is in force: what was kept of the one before holds no more.
+                    // Another model is in force: the estimates for the one before no longer hold.
                     train.content.key.model = reading.snapshot.model_hash;
                     train.content.estimates.clear();
                 }
@@ -137,8 +138,8 @@ impl StateKeeper {
     }
 }
 
-/// Takes a validated estimate into the state; true when it is another than before. What is not
-/// validated leaves the older estimate, with its older time, where it is.
+/// Takes a validated estimate into the state; true when it is another than before. An estimate that is not validated
+/// leaves the older one, with its older time, in the state.
 fn keep(
     content: &mut StateContent,
     pipeline: &str,

@@ -1,16 +1,15 @@
 //! Estimates that outlive the daemon: one state file for each train.
 //!
-//! A thread of its own polls the published snapshots as any client does, and writes what is
-//! validated (see [`KeptEstimate`]) from time to time; the pipeline threads know nothing of it.
-//! A second copy lies in the run-time directory, a second old at most: it is what a daemon leaves that dies at once.
-//! The next daemon takes the file up when it is whole, of the same train, wheel set, model and
-//! settings, and not too old; else it says why not and starts cold.
+//! A thread of its own polls the published snapshots as any client does, and writes the validated estimates (see
+//! [`KeptEstimate`]) from time to time; the pipeline threads know nothing of it. A second copy in the run-time
+//! directory, a second old at most, survives a daemon that dies at once. The next daemon takes the file up when it is
+//! whole, of the same train, wheel set, model and settings, and not too old; otherwise it says why not and starts cold.
 //!
 //! # Layout
 //!
-//! - [`directories`]: where it lies
-//! - [`mod@file`]: the bytes: header, checksum, atomic replacement
-//! - [`entry`]: the content: keys and estimates
+//! - [`directories`]: where the files lie
+//! - [`mod@file`]: the bytes of a file: header, checksum, atomic replacement
+//! - [`entry`]: the content of a file: keys and estimates
 //! - [`keeper`]: the thread that writes
 //!
 //! [`KeptEstimate`]: dynocar_core::pipeline::KeptEstimate

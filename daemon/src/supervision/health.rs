@@ -12,18 +12,18 @@ use dynocar_transport::{ChannelError, Host, Peer, Role, monotonic_now_ns};
 use crate::observing::ObservedTrain;
 use crate::operator::{Suspicion, refusals};
 
-/// How long a first snapshot is waited for; a daemon vouches for its snapshots each 0.1 s.
+/// How long to wait for a first snapshot; a daemon vouches for its snapshots every 0.1 s.
 const PATIENCE: Duration = Duration::from_millis(1_500);
 
 named! {
     /// How well a train is served; the worse, the greater.
     #[derive(PartialOrd, Ord)]
     Verdict ("in words") {
-        /// Every pipeline is vouched for, none with a reservation.
+        /// Every pipeline is vouched for, and none has a reservation.
         Ok "ok";
         /// A pipeline is degraded or invalid, or fed with samples that cannot be true.
         Degraded "degraded";
-        /// There is a daemon, but a pipeline, or all, have not been heard of lately.
+        /// There is a daemon, but one of its pipelines, or all, have given no sign of life lately.
         Stale "stale";
         /// The daemon there shares no memory format with this program.
         Incompatible "incompatible";
@@ -43,7 +43,7 @@ impl Verdict {
         }
     }
 
-    /// Returns the remedy, whatever the pipelines say.
+    /// Returns the remedy for the verdict, independent of the pipelines' reasons.
     pub const fn remedy(self) -> &'static str {
         match self {
             Verdict::Ok => "nothing",
@@ -93,7 +93,7 @@ pub struct PipelineHealth {
 }
 
 impl PipelineHealth {
-    /// Returns status and reason, then each quantity with its state of use and what ends it.
+    /// Returns status and reason, then each quantity with its state of use and the event that ends this state.
     pub fn in_words(&self) -> String {
         let reason = match self.reason {
             Some(Reason::None) => String::new(),

@@ -1,7 +1,7 @@
 //! A loopback listener that answers `GET` and `HEAD` of `/metrics` and nothing else.
 //!
-//! A bounded number of connections, each with a bounded request and a bounded time, none of which is
-//! waited for: whoever connects can neither grow nor hold up more than its own connection.
+//! The number of connections is bounded, and so are the request and the time of each; the listener waits for none of
+//! them. A client can fill and delay only its own connection.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -18,11 +18,11 @@ use crate::shadow::Board;
 
 /// The longest request in bytes.
 const REQUEST_BYTES_MAX: usize = 4096;
-/// How long a request may take to come, and an answer to be taken.
+/// How long a request may take to arrive, and an answer to be read.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// How often the thread looks whether to stop.
+/// Time between two checks whether to stop.
 const ROUND: Duration = Duration::from_millis(50);
-/// Connections that stay; whoever comes beyond them takes the place of the oldest.
+/// Connections that stay open; a further client takes the place of the oldest.
 const CONNECTIONS_MAX: usize = 32;
 
 /// Opens the listener.

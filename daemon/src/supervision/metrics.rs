@@ -1,4 +1,4 @@
-//! The daemon's numbers as OpenMetrics text, taken from its snapshots as every observer takes them.
+//! The daemon's numbers as OpenMetrics text, taken from its snapshots, as every observer takes them.
 
 use dynocar_client::Reading;
 use dynocar_shared::vocabulary::EffectKind;
@@ -51,7 +51,7 @@ struct Families {
 }
 
 impl Families {
-    /// Returns the name without the prefix, help and family of what only grows.
+    /// Returns the name without the prefix, help and family of every counter.
     fn counters(&self) -> [(&'static str, &'static str, &Counters); 6] {
         [
             ("samples_used", "Samples that entered the estimate", &self.used),
@@ -63,7 +63,7 @@ impl Families {
         ]
     }
 
-    /// Returns the same of what goes up and down.
+    /// Returns the same of every gauge.
     fn gauges(&self) -> [(&'static str, &'static str, &Gauges); 16] {
         [
             ("status", "1 for the status that holds", &self.status),
@@ -183,8 +183,8 @@ impl Families {
     }
 }
 
-/// Returns the newest snapshots and what models on trial show, as OpenMetrics text; `names` are the
-/// pipelines' by their number.
+/// Returns the newest snapshots and the figures of models on trial, as OpenMetrics text; `names` are the pipelines' by
+/// their number.
 pub fn text(trains: &mut [ObservedTrain], names: &[String], pinned: &Pinned) -> String {
     let families = Families::default();
     pinned.models.iter().for_each(|it| families.take_trial(it));

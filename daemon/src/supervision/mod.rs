@@ -3,7 +3,7 @@
 //! - [`notify`]: readiness and watchdog by the protocol of `sd_notify`
 //! - [`health`]: one verdict on a train's daemon, from outside
 //! - [`metrics`]: the numbers as OpenMetrics text
-//! - [`listener`]: the loopback listener that hands them out
+//! - [`listener`]: the loopback listener that serves this text
 
 pub mod health;
 pub mod listener;

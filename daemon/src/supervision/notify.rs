@@ -14,8 +14,7 @@ use tracing::{error, warn};
 
 use crate::runtime::tally::Tally;
 
-/// A pipeline thread without a sign of life for so long hangs; it gives one every heartbeat, at
-/// least each 0.1 s.
+/// A pipeline thread without a sign of life for this long hangs; it gives one every heartbeat, at least every 0.1 s.
 const SILENCE_MAX: Duration = Duration::from_secs(2);
 
 /// The supervisor's socket, if there is a supervisor.

@@ -17,12 +17,12 @@ pub struct Advisor {
 }
 
 impl Advisor {
-    /// For a train as it is declared, where that is known.
+    /// Returns an advisor for a train as it is declared, where its declaration is known.
     pub fn new(train: Option<Arc<TrainModel>>) -> Self {
         Advisor { train, noise: NoiseSeen::default() }
     }
 
-    /// Looks at the snapshots; call it with every one or with some of them.
+    /// Takes in the snapshots; call it with every one or with some of them.
     pub fn see(&mut self, state: &TrainState) {
         if let Some(resistance) = state.answering(Quantity::Resistance) {
             self.noise.see(&resistance.snapshot);

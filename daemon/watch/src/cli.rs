@@ -17,7 +17,7 @@ use dynocar_transport::Host;
 use crate::watcher::Watcher;
 use crate::{plain, terminal};
 
-/// Show in the terminal what is estimated of a train, and what to drive next.
+/// Show in the terminal the estimates of a train, and which manoeuvre to drive next.
 ///
 /// Quantities with 95 % intervals, residual and suspect, samples used, refused and lost. Without options
 /// it shows all trains that any daemon of this host serves. Where standard output is no terminal it
@@ -25,8 +25,8 @@ use crate::{plain, terminal};
 #[derive(Debug, Parser)]
 #[command(name = "dynocar watch", bin_name = "dynocar watch", version)]
 struct Arguments {
-    /// The daemon's configuration: its root, its trains and what is declared of them; what to drive
-    /// next is computed within the limits declared there
+    /// The daemon's configuration: its root, its trains and their declarations; the next manoeuvre is computed within
+    /// the limits declared there
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Only this train; may be given several times

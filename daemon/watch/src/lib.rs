@@ -1,13 +1,12 @@
 //! `dynocar watch`: the daemon's estimates of its trains, live in a terminal, and the next manoeuvre to drive.
 //!
-//! It is one reader of the snapshots of each train, as every client is, and touches no control
-//! cycle.
+//! It is one reader of the snapshots of each train, as every client is, and delays no control cycle.
 //!
 //! # Layout
 //!
 //! - [`cli`]: the command line
-//! - [`watcher`]: the observed trains, and their shown state
-//! - [`state`]: a train as it is shown and its last minutes, without any clock or channel
+//! - [`watcher`]: the observed trains, and the state of each that is shown
+//! - [`state`]: the shown state of a train and its last minutes, without any clock or channel
 //! - [`advisor`]: advice on the next manoeuvre, now and then
 //! - [`words`]: numbers with intervals and units, a train's lines
 //! - [`screen`]: the screen, drawn from a [`state`]

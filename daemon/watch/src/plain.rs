@@ -12,9 +12,9 @@ use crate::state::TrainState;
 use crate::watcher::Watcher;
 use crate::words::{daemon, residual, rows, samples};
 
-/// How often snapshots are taken.
+/// Time between two polls for snapshots.
 const POLL_EVERY: Duration = Duration::from_millis(100);
-/// How often lines are written.
+/// Time between two writings.
 const WRITE_EVERY: Duration = Duration::from_secs(1);
 
 /// Writes lines until the program is to end, or until nobody reads them any more.
@@ -23,7 +23,7 @@ const WRITE_EVERY: Duration = Duration::from_secs(1);
 ///
 /// When standard output cannot be written.
 pub fn run(watcher: &mut Watcher, ending: &ProgramEnding) -> Result<(), Failure> {
-    // The first look takes what is there; a heartbeat brings it.
+    // The first poll takes the snapshots that are there; a heartbeat brings them.
     let mut next = Instant::now() + WRITE_EVERY / 2;
     while !ending.is_due() {
         watcher.look();

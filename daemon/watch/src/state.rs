@@ -1,4 +1,4 @@
-//! A train as it is shown and its last minutes, without any clock or channel.
+//! The shown state of a train and its last minutes, without any clock or channel.
 
 use std::collections::VecDeque;
 
@@ -7,14 +7,14 @@ use dynocar_shared::{
     ParameterSnapshot, PipelineKind, Quantity, Reason, Status, TrainId, UseState,
 };
 
-/// Who serves a train, as far as one can see.
+/// Daemon of a train, as far as this program can see it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Daemon {
-    /// Nobody, and nobody was seen before.
+    /// There is no daemon, and none was seen before.
     Absent,
-    /// Nobody any more.
+    /// The daemon that was seen is gone.
     Gone,
-    /// A daemon that says this of itself.
+    /// A daemon that publishes this about itself.
     Serving {
         /// Its release.
         version: String,
@@ -25,7 +25,7 @@ pub enum Daemon {
     Unreadable(String),
 }
 
-/// The newest of one pipeline.
+/// The newest state of one pipeline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PipelineState {
     /// Its name in the configuration, else its kind's.

@@ -1,4 +1,4 @@
-//! Keys, a terminal that is left as it was, and one that is gone or takes nothing more.
+//! Keys, a terminal that is restored at the end, and a terminal that is gone or takes no more output.
 
 use std::io;
 use std::sync::Arc;
@@ -14,11 +14,11 @@ use ratatui::DefaultTerminal;
 use crate::screen::{Palette, ScreenChoice, ScreenView, draw};
 use crate::watcher::Watcher;
 
-/// How often snapshots are taken and keys waited for.
+/// Time between two polls for snapshots and keys.
 const POLL_EVERY: Duration = Duration::from_millis(100);
-/// How often the screen is drawn without a key: slow lines carry it.
+/// Time between two drawings without a key: even slow lines can carry this.
 const DRAW_EVERY: Duration = Duration::from_millis(500);
-/// How long the end may take: nothing is lost with a screen.
+/// How long the end of the program may take: an unfinished screen is no loss.
 const END_WITHIN: Duration = Duration::from_secs(2);
 
 /// Shows the screen until a key, a signal or the terminal's end ends it; a panic restores the terminal
@@ -53,7 +53,7 @@ pub fn end_though_stuck(must_end: Arc<AtomicBool>) -> io::Result<()> {
             std::thread::sleep(POLL_EVERY);
         }
         std::thread::sleep(END_WITHIN);
-        // Only what needs no writing can be restored.
+        // Only settings that need no writing can be restored.
         let _ = disable_raw_mode();
         std::process::exit(0);
     };

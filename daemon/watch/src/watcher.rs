@@ -1,4 +1,4 @@
-//! The observed trains, and their shown state.
+//! The observed trains, and the state of each that is shown.
 
 use std::mem::take;
 use std::time::{Duration, Instant};
@@ -12,9 +12,9 @@ use super::state::PlotHistory;
 use crate::advisor::Advisor;
 use crate::state::{Daemon, PipelineState, TrainState};
 
-/// How often daemons are looked for, and points of the plots taken.
+/// Time between two searches for daemons, and between two points of the plots.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
-/// How often it is computed what to drive next.
+/// Time between two computations of the next manoeuvre.
 const ADVISE_EVERY: Duration = Duration::from_secs(5);
 
 /// Watches trains.
@@ -53,7 +53,7 @@ impl Watcher {
         self.watched.iter().map(|it| &it.state).collect()
     }
 
-    /// Takes what has come; call it some times a second.
+    /// Takes the new snapshots; call it some times a second.
     pub fn look(&mut self) {
         let is_due = |last: Option<Instant>, every| last.is_none_or(|it| it.elapsed() >= every);
         let is_second = is_due(self.last_look, LOOK_EVERY);

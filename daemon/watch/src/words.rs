@@ -144,7 +144,7 @@ pub fn samples(train: &TrainState) -> String {
     format!("{rate} samples/s, used {used}, rejected {rejected}{why}, lost {lost}")
 }
 
-/// Returns the unexplained force with its interval, and the suspect with what else it could be.
+/// Returns the unexplained force with its interval, and the suspect with its alternatives.
 pub fn residual(train: &TrainState) -> Option<(String, String)> {
     let snapshot = &train.residual()?.snapshot;
     let force = force_words(snapshot.unexplained_force_n, snapshot.unexplained_force_std_n);

@@ -5,10 +5,10 @@ use crate::adhesion::Uncertain;
 
 /// Equal steps of speed in a stop.
 const STEPS: usize = 128;
-/// Equal steps of time before the brake comes, and while it builds up.
+/// Equal steps of time before the brake acts, and while it builds up.
 const RESPONSE_STEPS: [usize; 2] = [16, 64];
 
-/// Where a stop has come to.
+/// State of a stop that is being integrated.
 #[derive(Clone, Copy)]
 struct Progress {
     time_s: f64,
@@ -17,7 +17,7 @@ struct Progress {
 }
 
 impl Stop<'_> {
-    /// Returns the distance and time; the speed without deceleration else.
+    /// Returns the distance and time, or the speed at which there is no deceleration.
     pub(super) fn integrate(&self, shift: Shift) -> Result<(f64, f64), f64> {
         let built_up = self.build_up(shift);
         let step_mps = (built_up.speed_mps - self.to_speed_mps) / (2 * STEPS) as f64;

@@ -64,7 +64,7 @@ fn air_drag_gives_the_closed_form() {
 
 #[test]
 fn stops_of_xie_2019_figures_10_and_11_follow() {
-    // Figures of an independent integration in time; in brackets what the paper states.
+    // Figures of an independent integration in time; in brackets those of the paper.
     let cases = [
         (RailAdhesion::Coefficient(Uncertain::exact(0.1542)), 3085.5, 56.0), // 3060.7, 56.1
         (RailAdhesion::Coefficient(Uncertain::exact(0.0726)), 3916.4, 71.3), // 3946.7, 71.7

@@ -1,5 +1,5 @@
-//! Each kind of effect: one row with its number, its name, and the words that report, log, watch and the answer of
-//! `explain` have for it.
+//! Each kind of effect: one row with its number, its name, and the words for it in reports, the log, `dynocar watch`
+//! and the answer of `explain`.
 
 /// A kind of effect in words.
 #[derive(Debug)]

@@ -3,9 +3,9 @@
 use super::{Reason, Status};
 
 vocabulary! {
-    /// Whether a controller may use the values for what it asked for, in one word.
+    /// Whether a controller may use the values for its request, in one word.
     UseState: u32 {
-        /// The values may be used, whatever the status of the estimate as a whole.
+        /// The values may be used, independent of the status of the estimate as a whole.
         Usable = 1 "usable",
         /// Not known well enough yet.
         Learning = 2 "learning",
@@ -41,7 +41,7 @@ impl UseState {
         }
     }
 
-    /// Returns what ends it, in words.
+    /// Returns the event that ends the state, in words.
     pub const fn ends(self) -> &'static str {
         match self {
             UseState::Usable => "half a second of doubt ends it",

@@ -1,4 +1,4 @@
-//! Announcement of a side of the channel.
+//! Announcement of one side of the channel: a daemon or a controller.
 
 use std::fmt;
 use std::path::Path;
@@ -98,7 +98,7 @@ impl Announcement {
         )
     }
 
-    /// Reads what [`Announcement::to_text`] wrote; keys that a newer release adds are passed over.
+    /// Reads the text that [`Announcement::to_text`] wrote; keys that a newer release adds are ignored.
     pub(crate) fn from_text(role: Role, text: &str) -> Option<Self> {
         let value = |key: &str| {
             text.lines().find_map(|line| line.split_once('=').filter(|pair| pair.0 == key))

@@ -1,9 +1,9 @@
 //! The run-time files of this host, and its monotonic clock, common to all its processes.
 //!
-//! A root directory holds who serves and who drives each train, in `trains/`. The transport's files lie
-//! beside its segments in `/dev/shm`, under names that follow from the root's device, inode and
-//! birth: two spellings of one directory meet, two directories never do, also where one is removed and
-//! another made, and the sockets' names are short however long the root's is.
+//! A root directory holds, in `trains/`, the announcements of who serves and who drives each train. The transport's
+//! files lie with its segments in `/dev/shm`, under names that follow from the root's device, inode and time of
+//! creation: two spellings of one directory give the same names, two directories never do, even if one is removed and
+//! another made, and the sockets' names are short for a long root, too.
 
 use std::fs::{DirBuilder, File, OpenOptions, Permissions};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
@@ -21,10 +21,9 @@ use crate::identity::{DirectoryIdentity, SHARED_MEMORY};
 /// Longest root directory in bytes: the system's limit of a path, less the names of files in it.
 const ROOT_BYTES_MAX: usize = 4000;
 
-/// Connections to dead senders whose last messages are still kept. A receiver looks through a
-/// place for each of them whenever it is polled: the transport's default of 128 took more than
-/// half of the time of a poll. Without a place the dead sender's last message is dropped, and it
-/// is older than what its successor says.
+/// Connections to dead senders whose last messages are still kept. A receiver looks through a place for each of them
+/// whenever it is polled: the transport's default of 128 took more than half of the time of a poll. Without a place the
+/// dead sender's last message is dropped, and it is older than the messages of its successor.
 const EXPIRED_CONNECTIONS: usize = 8;
 
 /// The announcements' directory in the root.

@@ -1,4 +1,4 @@
-//! Identity of a file, a directory or the shared memory, whatever its name.
+//! Identity of a file, a directory or the shared memory, independent of its name.
 
 use std::fs::Metadata;
 use std::os::unix::fs::MetadataExt;
@@ -8,7 +8,7 @@ use std::time::UNIX_EPOCH;
 /// Where the system keeps shared memory by name.
 pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 
-/// A directory, whatever it is called: its device and its inode.
+/// Identity of a directory, independent of its name: its device and its inode.
 pub(crate) type Identity = [u64; 2];
 
 /// Returns the identity of the directory at a path.
@@ -21,7 +21,7 @@ pub(crate) fn identity(attributes: &Metadata) -> Identity {
     [attributes.dev(), attributes.ino()]
 }
 
-/// A directory that no later one is taken for: a removed directory's inode is given to the next one.
+/// A directory that cannot be confused with a later one: a removed directory's inode is given to the next one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct DirectoryIdentity {
     place: Identity,

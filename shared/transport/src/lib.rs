@@ -1,4 +1,4 @@
-//! The channels that the daemon and a controller's library both stand on.
+//! The channels that the daemon and a controller's library both use.
 //!
 //! # Layout
 //!

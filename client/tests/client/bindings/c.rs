@@ -11,7 +11,7 @@ use dynocar_shared::{ParameterSnapshot, SCHEMA_MAJOR, TrainSample};
 
 use super::vocabularies::{self as vocabularies, Member, Vocabulary, plain};
 
-/// Columns of a comment's line.
+/// Columns of a line of a comment.
 const WIDTH: usize = 98;
 /// Lengths of arrays that have a name.
 const LENGTHS: [(usize, &str); 3] = [
@@ -19,7 +19,7 @@ const LENGTHS: [(usize, &str); 3] = [
     (PARAMETERS_MAX, "DYNOCAR_PARAMETERS_MAX"),
     (COVARIANCE_ENTRIES, "DYNOCAR_COVARIANCE_ENTRIES"),
 ];
-/// Names of Rust in meanings, and what C calls them.
+/// Names of Rust in meanings, and their names in C.
 const NAMES: [(&str, &str); 11] = [
     ("PipelineKind", "DYNOCAR_PIPELINE_..."),
     ("Status", "DYNOCAR_STATUS_..."),

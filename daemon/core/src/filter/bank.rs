@@ -1,8 +1,8 @@
-//! A bank of hypotheses: filters side by side, each under an assumption of its own, weighed by evidence.
+//! A bank of hypotheses: filters side by side, each under its own assumption, weighted by evidence.
 //!
-//! Which assumptions compete, when a new one joins and how they give way to each other is the affair
-//! of whoever keeps the bank; what each weighs, which is the likeliest and what they say together is reported
-//! here (multiple models: Bar-Shalom, Li, Kirubarajan 2001, section 11.6).
+//! The caller decides which assumptions compete, when a new one joins and how one replaces another. The bank reports
+//! the weight of each hypothesis, the likeliest one and their mixture (multiple models: Bar-Shalom, Li, Kirubarajan
+//! 2001, section 11.6).
 
 use arrayvec::ArrayVec;
 use nalgebra::{SMatrix, SVector};
@@ -11,19 +11,19 @@ use super::Gaussian;
 
 /// At most `MAX` hypotheses with the evidence for each, in the order in which they joined.
 ///
-/// Whoever moves and measures the hypotheses adds to their weights, and lets the bank settle. A weight
-/// is the logarithm of a likelihood, of any size, or odds, the cheapest where likelihoods come as
-/// densities that cannot vanish.
+/// The caller, who moves and measures the hypotheses, adds to their weights and lets the bank settle. A weight is the
+/// logarithm of a likelihood, of any size, or it is odds: the cheaper form where likelihoods are densities that cannot
+/// vanish.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bank<H, const MAX: usize> {
     hypotheses: ArrayVec<H, MAX>,
-    /// Of places without a hypothesis, negative infinity.
+    /// Negative infinity at an index without a hypothesis.
     weights: [f64; MAX],
     likeliest: usize,
 }
 
 impl<H, const MAX: usize> Bank<H, MAX> {
-    /// Hypotheses of one weight, 0 for a logarithm and 1 for odds, the first believed until evidence
+    /// Returns hypotheses of equal weight: 0 as a logarithm, 1 as odds. The first is the likeliest until evidence
     /// comes.
     ///
     /// # Panics
@@ -76,7 +76,7 @@ impl<H, const MAX: usize> Bank<H, MAX> {
         self.likeliest
     }
 
-    /// Takes a hypothesis for the likeliest until the bank settles, whatever its weight.
+    /// Takes a hypothesis for the likeliest until the bank settles, regardless of its weight.
     pub fn believe(&mut self, index: usize) {
         self.likeliest = index;
     }

@@ -16,9 +16,9 @@ pub struct Bounded<const N: usize> {
 /// Minimises `(x - free)' H (x - free)` over `x >= lower`, `free` being the unconstrained
 /// minimiser and H its information matrix.
 ///
-/// Tries the sets of active bounds, smallest first, until one meets the conditions of Karush,
-/// Kuhn and Tucker; for the few parameters of a resistance law that is the shortest way. The
-/// others move along the valley of H when one is held, which plain clipping forgets.
+/// Tries the sets of active bounds, smallest first, until one meets the conditions of Karush, Kuhn and Tucker; for the
+/// few parameters of a resistance law this is the shortest way. While one parameter is held, the others move along the
+/// valley of H; plain clipping would ignore that.
 ///
 /// # Errors
 ///

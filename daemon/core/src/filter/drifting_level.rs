@@ -6,12 +6,11 @@
 //! bias_k+1  = keep_k bias_k + w_k
 //! ```
 //!
-//! Integral regression of motion has this form: the level is the speed that the integrals do
-//! not explain, the bias an acceleration that no parameter explains, and theta stays. Kept as
-//! square-root information, `R [level; bias; theta] = z + nu` with `R` upper triangular and `nu`
-//! of unit covariance (Bierman 1977, chapters V and VII). The level and the bias come first, so
-//! that a time step touches two rows only, and forgetting them drops rows, which marginalises
-//! them exactly.
+//! Integral regression of motion has this form: the level is the speed that the integrals do not explain, the bias an
+//! acceleration that no parameter explains, and theta is constant. The unknowns are stored as square-root information,
+//! `R [level; bias; theta] = z + nu` with `R` upper triangular and `nu` of unit covariance (Bierman 1977, chapters V
+//! and VII). The level and the bias come first, so that a time step touches only two rows, and forgetting them drops
+//! rows, which marginalises them exactly.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -19,14 +18,14 @@ use nalgebra::{SMatrix, SVector};
 pub const LEVEL: usize = 0;
 /// Index of the bias among the unknowns.
 pub const BIAS: usize = 1;
-/// Place where the parameters begin.
+/// Index of the first parameter.
 pub const PARAMETERS: usize = 2;
 
 /// Innovation of a measurement, as computed when it was absorbed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LevelInnovation {
-    /// Measured minus predicted over its predicted standard deviation; `None` where the
-    /// measurement only fixed what was free before.
+    /// Measured minus predicted over its predicted standard deviation; `None` where the measurement only determined a
+    /// state that was free before.
     pub normalised: Option<f64>,
     /// Logarithm of the predicted variance over the measurement's own variance.
     pub log_variance_ratio: f64,
@@ -39,9 +38,9 @@ pub struct DriftStep {
     pub gain: f64,
     /// Share of the bias that stays, above 0.
     pub keep: f64,
-    /// Variance of what comes to the bias.
+    /// Variance of the noise added to the bias.
     pub noise_variance: f64,
-    /// Variance of what comes to the level besides.
+    /// Variance of the noise added to the level itself.
     pub level_noise_variance: f64,
 }
 
@@ -66,7 +65,7 @@ impl<const N: usize> DriftingLevel<N> {
         filter
     }
 
-    /// Forgets the level, as after a gap; what it taught of the rest stays.
+    /// Forgets the level, as after a gap; the knowledge that it gave of bias and parameters stays.
     pub fn free_level(&mut self) {
         self.root[LEVEL] = [0.0; N];
         self.target[LEVEL] = 0.0;

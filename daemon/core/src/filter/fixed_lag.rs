@@ -7,10 +7,10 @@
 //! no backward pass is made; the cost of a step is one small matrix-vector product for each
 //! remembered moment.
 //!
-//! Over a fixed interval the adjoint of the filter smooths (Bryson and Frazier 1963; for scalar
-//! measurements Bierman 1973). The backward pass carries what the later measurements say as a vector: it multiplies and adds,
-//! inverts no covariance, and so cannot fail where a prediction is nearly certain. Its means are
-//! those of Rauch, Tung and Striebel.
+//! Over a fixed interval the adjoint of the filter smooths (Bryson and Frazier 1963; for scalar measurements Bierman
+//! 1973). The backward pass carries the information of the later measurements as a vector: it multiplies and adds,
+//! inverts no covariance, and so cannot fail where a prediction is nearly certain. Its means are those of Rauch, Tung
+//! and Striebel.
 
 use nalgebra::{SMatrix, SVector};
 

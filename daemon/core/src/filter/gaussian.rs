@@ -1,8 +1,8 @@
 //! A Gaussian belief about a state, in covariance form.
 //!
-//! Every filter of the covariance form is made of these steps: the whole state moves by a
-//! linearised model, or single states are rewritten where most of them stay; then measurements of
-//! single states are taken in, each in three parts, so that it can be judged before it counts.
+//! Every filter in covariance form consists of these steps. First the whole state moves by a linearised model; where
+//! most states stay, only single ones are rewritten. Then measurements of single states are taken in, each in three
+//! parts, so that it can be judged before it counts.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -16,12 +16,12 @@ pub struct Innovation {
     pub value: f64,
     /// Its predicted variance: the belief's and the measurement's own.
     pub variance: f64,
-    /// One over it.
+    /// One over `variance`.
     pub inverse_variance: f64,
 }
 
 impl Innovation {
-    /// From a difference, the variance of the prediction and that of the measurement.
+    /// Returns the innovation of a difference, with the variances of the prediction and of the measurement.
     ///
     /// # Errors
     ///
@@ -151,7 +151,7 @@ impl<const N: usize> Gaussian<N> {
         noise_variance: f64,
     ) -> SVector<f64, N> {
         let spread = self.covariance.column(i).into_owned();
-        // The inverse is known last: what does not need it is computed before.
+        // The inverse is known last: terms that do not need it are computed before.
         self.mean += (spread * innovation.value) * innovation.inverse_variance;
         let mut row = SVector::zeros();
         row[i] = 1.0;
@@ -255,7 +255,7 @@ mod tests {
         }
     }
 
-    /// x0 gathers what two constants let through; each step of x0 is seen with noise.
+    /// x0 is the sum of two constants, each times random factors; each step of x0 is measured with noise.
     #[test]
     fn rewriting_without_process_noise_is_the_least_squares_of_all_observations() {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(5);

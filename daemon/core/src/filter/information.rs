@@ -5,7 +5,7 @@ use nalgebra::{SMatrix, SVector};
 use super::NotPositiveDefinite;
 use super::triangular::TriangularSystem;
 
-/// All rows seen so far, condensed into a triangular system, with the sum of their residuals.
+/// All rows seen so far, condensed into a triangular system, and the sum of their squared residuals.
 ///
 /// The system's square plus the residual sum equals the sum of squares over all rows, so that the
 /// solution is the batch solution at any time (Bierman 1977, chapter IV). Rows enter by Givens
@@ -18,8 +18,8 @@ pub struct SquareRootInformation<const N: usize> {
 }
 
 impl<const N: usize> SquareRootInformation<N> {
-    /// Returns the information of no rows, but the penalty `sum of weight * (theta - prior)^2`; a weight of 0 is no
-    /// penalty.
+    /// Returns the information before any row: only the penalty `sum of weight * (theta - prior)^2`. A weight of 0 is
+    /// no penalty.
     pub fn new(weights: &SVector<f64, N>, prior: &SVector<f64, N>) -> Self {
         let roots = weights.map(|weight| weight.max(0.0).sqrt());
         let system = TriangularSystem {
@@ -49,8 +49,7 @@ impl<const N: usize> SquareRootInformation<N> {
         }
     }
 
-    /// Adds what is known from elsewhere, as a row of unit variance that counts neither as a row
-    /// nor as residual.
+    /// Adds knowledge from another source, as a row of unit variance that counts neither as a row nor in the residuals.
     pub fn add_knowledge(&mut self, features: &SVector<f64, N>, observed: f64) {
         self.system.append(*features, -observed);
     }

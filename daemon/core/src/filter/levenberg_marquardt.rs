@@ -26,8 +26,8 @@ pub struct Linearisation<const N: usize> {
     pub cost: f64,
     /// R and z.
     pub system: TriangularSystem<N>,
-    /// Decrease of the cost that the next linearisation promises by parameters which the
-    /// problem has eliminated and moves along on its own; 0 when there are none.
+    /// Decrease of the cost that the next linearisation promises by parameters which the problem has eliminated and
+    /// moves itself; 0 when there are no such parameters.
     pub nested_decrease: f64,
 }
 

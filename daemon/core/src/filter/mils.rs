@@ -80,9 +80,8 @@ impl<const N: usize, const L: usize> Mils<N, L> {
 
     /// Returns the estimate's covariance in units of the error's variance: p P.
     ///
-    /// Exact without regularisation, since every row entered p times. With it, it is the
-    /// posterior covariance for a prior of weight lambda/p, which is what the repetition makes
-    /// of lambda.
+    /// Exact without regularisation, since every row entered p times. With regularisation, it is the posterior
+    /// covariance for a prior of weight lambda/p, since the repetition divides lambda by p.
     pub fn covariance(&self) -> SMatrix<f64, N, N> {
         self.belief.covariance * self.length as f64
     }

@@ -1,18 +1,18 @@
 //! Recursive estimators and solvers of fixed size, without any knowledge of trains.
 //!
-//! Sizes are const generics, memory is the structs' own, and no update allocates. Each is
-//! tested against its batch least-squares twin.
+//! Sizes are const generics, memory is the structs' own, and no update allocates. Each estimator is tested against its
+//! batch least-squares twin.
 //!
 //! - [`gaussian`]: a belief in covariance form, measured by Joseph's form where subtraction would
 //!   cost digits; `rank_one` is its arithmetic
-//! - [`square_root`]: the same with the covariance as a triangular factor
+//! - [`square_root`]: a belief whose covariance is stored as a triangular factor
 //! - `information`, [`triangular`]: a belief in square-root information form; [`drifting_level`] is
 //!   one with a level that may drift
 //! - `rls`, `mils`, `bounded`: least squares, recursive, with bounds
-//! - `whitening`, `line`, `median`: from raw rows to independent, clean ones
+//! - `whitening`, `straight_line`, `median`: from raw rows to independent, clean ones
 //! - [`levenberg_marquardt`]: small nonlinear least squares in a box
-//! - [`fixed_lag`]: estimates of an earlier state by later measurements, without a backward pass or by one
-//!   without an inverse (Bryson and Frazier)
+//! - [`fixed_lag`]: estimates of an earlier state by later measurements, either without a backward pass or by one that
+//!   inverts no covariance (Bryson and Frazier)
 //! - [`particle`], [`random`]: particle filter, marginal particle smoother and their seeded generator
 //! - [`bank`]: hypotheses side by side, weighed by evidence, and beliefs mixed by weight
 //! - [`lanes`]: sums and powers over slices

@@ -9,10 +9,9 @@ const SHARE_LEFT_MIN: f64 = 1e-3;
 /// Takes a measurement `row` · x + noise with the best gain into a symmetric covariance, and
 /// keeps it symmetric and positive.
 ///
-/// `spread` is P hᵀ, `inverse_variance` one over the innovation's variance. A measurement shrinks
-/// one direction only, by noise over innovation variance. Where that is not little, P - S Sᵀ / v
-/// keeps its digits and is taken; where nearly all of a variance goes, as from a wide prior,
-/// Joseph's form.
+/// `spread` is P hᵀ, `inverse_variance` one over the innovation's variance. A measurement shrinks one direction only,
+/// by the ratio of noise to innovation variance. Unless that ratio is small, P - S Sᵀ / v keeps its digits and is used;
+/// where nearly all of a variance goes, as from a wide prior, Joseph's form is used.
 ///
 /// # Real-time
 ///
@@ -73,7 +72,7 @@ pub(super) fn moved<const N: usize>(
 }
 
 /// Takes a measurement `row` · x + noise into a symmetric covariance:
-/// P ← (I - K h) P (I - K h)ᵀ + K R Kᵀ, which keeps P positive whatever the rounding of K.
+/// P ← (I - K h) P (I - K h)ᵀ + K R Kᵀ, which keeps P positive regardless of the rounding of K.
 ///
 /// `spread` is P hᵀ. The two products are taken one after the other, each as a correction of
 /// rank one, so that the work grows with N² where full products would take N³; only half of the

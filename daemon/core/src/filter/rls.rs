@@ -6,21 +6,20 @@ use super::{Gaussian, Innovation, NotPositiveDefinite};
 
 /// Recursive least squares (Liu 2018, eq. 9-11).
 ///
-/// Joseph's form is taken where subtraction would cost digits, as from a wide prior.
+/// Joseph's form is used where subtraction would lose digits, as from a wide prior.
 ///
 /// The covariance is in units of the error's variance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rls<const N: usize> {
     /// The estimate with its covariance.
     pub belief: Gaussian<N>,
-    /// 1 when all rows count alike. Below it only what the newest row adds anew is forgotten (Cao and
-    /// Schwartz 2000): the estimate keeps what it knows in unexcited directions.
+    /// 1 when all rows count alike. Below 1, forgetting is limited to the direction of the newest row (Cao and Schwartz
+    /// 2000): the estimate keeps its knowledge of unexcited directions.
     forgetting: f64,
 }
 
 impl<const N: usize> Rls<N> {
-    /// Starts at `estimate` with independent errors of these variances; p0 for all of them in
-    /// Liu 2018.
+    /// Starts at `estimate` with independent errors of these variances; in Liu 2018 all of them are p0.
     pub fn new(estimate: SVector<f64, N>, variances: &SVector<f64, N>, forgetting: f64) -> Self {
         let covariance = SMatrix::from_diagonal(variances);
         Rls { belief: Gaussian { mean: estimate, covariance }, forgetting }

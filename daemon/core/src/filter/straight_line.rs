@@ -24,7 +24,7 @@ impl FittedLine {
         self.xx += x * x;
     }
 
-    /// Returns the line through the points of both, which must share their origin.
+    /// Returns the line through the points of two lines, which must share their origin.
     pub fn joined(&self, other: &FittedLine) -> FittedLine {
         FittedLine {
             count: self.count + other.count,

@@ -27,7 +27,7 @@ impl MovingState {
         }
     }
 
-    /// Filters forward; `seen` is given each step and, from the second on, that it moved first.
+    /// Filters forward; `seen` takes each step and the Jacobian of the move before it, `None` at the first step.
     pub fn forward(
         &self,
         mut seen: impl FnMut(&ForwardStep<2>, Option<&Matrix2<f64>>),

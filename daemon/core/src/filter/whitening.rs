@@ -27,22 +27,21 @@ pub struct Sighting<const S: usize, const C: usize> {
     pub variance: f64,
 }
 
-/// A sighting less what was known before.
+/// The innovation of a sighting, scaled to unit variance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnitRow<const C: usize> {
     /// The innovation by column, of unit variance.
     pub columns: SVector<f64, C>,
-    /// The variance taken off.
+    /// Variance of the innovation before it was scaled.
     pub variance: f64,
 }
 
 /// A Kalman filter whose states are affine in unknown parameters: the generalised least squares
 /// of a regression with correlated errors (Rosenberg 1973; de Jong 1991).
 ///
-/// Column 0 holds the known part, columns 1 to C - 1 what each parameter takes off it, so that
-/// a state is `x0 - x1 theta1 - x2 theta2 ...`. The gains do not depend on the parameters, so
-/// all columns run through one filter, and its innovations are rows
-/// `y = phi . theta + error` with independent errors of unit variance.
+/// Column 0 holds the known part, columns 1 to C - 1 the amounts that one unit of each parameter subtracts from it: a
+/// state is `x0 - x1 theta1 - x2 theta2 ...`. The gains do not depend on the parameters, so all columns run through one
+/// filter, and its innovations are rows `y = phi . theta + error` with independent errors of unit variance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Whitener<const S: usize, const C: usize> {
     /// The states by column.
@@ -76,7 +75,7 @@ impl<const S: usize, const C: usize> Whitener<S, C> {
         self.covariance[(i, i)] += variance;
     }
 
-    /// Forgets what parameter `column` takes off the states, for another to take its place.
+    /// Forgets the effect of parameter `column` on the states, so that another parameter can take its place.
     ///
     /// # Panics
     ///

@@ -1,4 +1,4 @@
-//! The interface of every estimator, and one that estimates nothing.
+//! The interface of every estimator, and an estimator that estimates nothing.
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
@@ -9,7 +9,7 @@ use super::judge::{InputState, Judgement};
 /// Result of an estimator's update with a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// The sample shows nothing of what is learned: it waits, or the train stands.
+    /// The sample carries no information about the parameters: the estimator waits, or the train stands.
     Idle,
     /// The sample was taken into account; the estimate stays as it was.
     Used,
@@ -27,7 +27,7 @@ pub trait Estimator: Send {
     /// Returns the kind of estimator, for the snapshot.
     fn kind(&self) -> PipelineKind;
 
-    /// Returns whether samples pass the gate for forces that stand alone before they are taken into account.
+    /// Returns whether samples pass the force gate, which holds back lone forces, before they are taken into account.
     fn is_gated(&self) -> bool {
         false
     }

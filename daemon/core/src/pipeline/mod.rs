@@ -115,8 +115,8 @@ impl Pipeline {
         self.admission.count_from(sequence);
     }
 
-    /// Counts as lost what has not come up to this number and will not any more; true when there
-    /// was something.
+    /// Counts as lost the samples up to this number that have not come and will not come any more; true when there were
+    /// any.
     pub fn count_up_to(&mut self, sequence: u64) -> bool {
         self.admission.count_up_to(sequence);
         let is_news = self.snapshot.samples_lost != self.admission.lost();
@@ -127,9 +127,8 @@ impl Pipeline {
 
     /// Takes one sample and gives the snapshot after it.
     ///
-    /// The snapshot's epoch, its time of publishing and what it answers are the caller's to fill in;
-    /// everything else
-    /// depends on the samples alone.
+    /// The caller fills in the snapshot's epoch, its time of publishing and the quantities that it answers; everything
+    /// else depends on the samples alone.
     ///
     /// # Real-time
     ///

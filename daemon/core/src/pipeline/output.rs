@@ -6,8 +6,8 @@ use nalgebra::{SMatrix, SVector};
 
 use super::InnovationMonitor;
 
-/// Returns a parameter's unit in the contract over the one that estimators compute in: a snapshot has the
-/// mass in t, everything here has it in kg.
+/// Returns the unit of a parameter in a snapshot over the unit that estimators compute in: a snapshot has the mass in
+/// t, the estimators have it in kg.
 pub fn contract_unit(parameter: Parameter) -> f64 {
     if parameter == Parameter::Mass { 1e-3 } else { 1.0 }
 }

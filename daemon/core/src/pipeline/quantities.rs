@@ -2,12 +2,11 @@
 
 use dynocar_shared::{PipelineKind, Quantity};
 
-/// Returns the kinds that can answer a quantity, the best measured first: the first of them that a train's
-/// configuration has is the one that answers unless the configuration names another.
+/// Returns the kinds that can answer a quantity, the best measured first: unless the configuration names another, the
+/// first kind that the train has answers.
 ///
-/// The order is that of `docs/scenarios.md`, then of the errors in `docs/papers.md` and of the misled
-/// looks in `docs/trust.md`;
-/// `docs/guides/reading.md` gives the figures.
+/// The order is that of `docs/scenarios.md`, then of the errors in `docs/papers.md` and of the share of misleading
+/// snapshots in `docs/trust.md`; `docs/guides/reading.md` gives the figures.
 pub const fn candidates(quantity: Quantity) -> &'static [PipelineKind] {
     use PipelineKind as Kind;
     match quantity {

@@ -5,13 +5,13 @@ use dynocar_shared::Quantity;
 
 use super::motion::BRIDGED_MAX_S;
 
-/// Time in s that an estimate has to be good before it may be used for the first time.
+/// Time in s for which an estimate must be good before it may be used for the first time.
 const ENTER_S: f64 = 2.0;
-/// Time in s of doubt after which it may no longer be used.
+/// Time in s of doubt after which an estimate may no longer be used.
 const LEAVE_S: f64 = 0.5;
-/// Time in s that an estimate has to be good after it was doubted; twice as long after each doubt.
+/// Time in s for which an estimate must be good after it was doubted; twice as long after each further doubt.
 const RETURN_FIRST_S: f64 = 5.0;
-/// The longest of them.
+/// The longest such time in s.
 const RETURN_MAX_S: f64 = 600.0;
 /// Time in s of use after which earlier doubts are forgotten.
 const FORGET_S: f64 = 1200.0;
@@ -20,9 +20,9 @@ const FORGET_S: f64 = 1200.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Switch {
     is_usable: bool,
-    /// Time in s for which the estimate has said the contrary.
+    /// Time in s for which the estimate has contradicted the switch.
     contrary_s: f64,
-    /// Time in s that it must say so before the switch follows.
+    /// Time in s for which the estimate must contradict before the switch follows.
     enter_s: f64,
     /// Time in s of use since the last doubt.
     used_s: f64,

@@ -25,22 +25,22 @@ const DISTANCE_RATIOS: (f64, f64) = (0.8, 1.25);
 const SAME_FACTOR: f64 = 1.6;
 /// Steps in s outside these bounds are unusual for a recorder of a train.
 const USUAL_STEP_S: (f64, f64) = (0.002, 20.0);
-/// Greatest share of the effort curve that a train may show, and the least that is worth a word.
+/// Greatest share of the effort curve that a train may use, and the least that is worth a remark.
 const EFFORT_SHARES: (f64, f64) = (0.02, 4.0);
 /// Gradients in ‰ (root mean square) below and beyond which a wrong unit is credible.
 const GRADIENT_RMS_PERMILLE: (f64, f64) = (3.0, 25.0);
-/// Factors of the gradient within these bounds are effects that a train and its line can have: those of simulated
-/// runs with every effect, large, lie between 0.8 and 1.3, and what is wrong at its place looks too large.
+/// Factors of the gradient within these bounds are effects that a train and its line can have: those of simulated runs
+/// with every effect, large, lie between 0.8 and 1.3, and the gradient of a wrong place looks too large.
 const GRADIENT_FACTORS: (f64, f64) = (1.0 / 1.5, 1.4);
-/// Windows of a recorded run, and deviations from 0, that are enough to judge its gradients by all of it.
+/// Windows of a recorded run, and standard deviations from 0, that are enough to judge its gradients by the whole run.
 const ALL_WINDOWS_MIN: f64 = 60.0;
 const ALL_DEVIATIONS_MIN: f64 = 20.0;
-/// Gradients at a wrong place or with noise look too large, too; they leave all of the true ones' scatter that they do
-/// not explain, and a wrong unit less than this share of it.
+/// Gradients at a wrong place or with noise look too large, too, but leave all of the scatter of the true gradients
+/// that they do not explain; a wrong unit leaves less than this share of it.
 const SCATTER_SHARE_MAX: f64 = 0.4;
-/// The least mean pressure in Pa of brakes that are applied; what is too high is out of range.
+/// The least mean pressure in Pa of applied brakes; a pressure that is too high is out of range.
 const BRAKING_PRESSURE_MIN_PA: f64 = 5e3;
-/// An ordinary one.
+/// An ordinary mean pressure in Pa of applied brakes.
 const ORDINARY_PRESSURE_PA: f64 = 1e5;
 
 /// Detected faults at most.

@@ -1,4 +1,4 @@
-//! Possible fault of a quantity, its factor, and the unit that would explain it, in a sentence.
+//! A possible input fault, its factor, and the unit that would explain it, in a sentence.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use dynocar_model::units::{Dimension, Unit};
 use dynocar_shared::{PipelineKind, Reason};
 use serde::Serialize;
 
-/// A unit is named when its factor and the one found differ by no more than this share.
+/// A unit is named when its factor differs from the factor found by no more than this share.
 const UNIT_TOLERANCE: f64 = 0.2;
 
 /// How much a note matters.
@@ -18,7 +18,7 @@ pub enum Severity {
     Info,
     /// May spoil results.
     Warning,
-    /// The data cannot be true: no result from them is.
+    /// The data cannot be true, so neither can any result from them.
     Fundamental,
 }
 
@@ -86,7 +86,7 @@ impl InputFault {
         }
     }
 
-    /// Returns whether it spoils what a kind of pipeline estimates: only brakes are judged by pressure.
+    /// Returns whether the fault spoils the estimates of a kind of pipeline: pressure matters for brakes only.
     pub const fn concerns(self, kind: PipelineKind) -> bool {
         use PipelineKind::*;
         match self {

@@ -1,7 +1,6 @@
 //! Plausibility of samples: wrong units, swapped forces, reversed signs.
 //!
-//! The same laws judge a train's samples live and recorded runs, both by
-//! [`Admission`](crate::pipeline::admission::Admission).
+//! The same laws judge live samples and recorded runs, both by [`Admission`](crate::pipeline::admission::Admission).
 //!
 //! # Layout, in the order of the work
 //!

@@ -17,7 +17,7 @@ const GAP_STEPS: f64 = 4.0;
 const STEP_SHARE: f64 = 0.1;
 /// Below this speed in m/s holding brakes and stiction act.
 const MOVING_MPS: f64 = 1.0;
-/// Share of a window that is refused, when any of it is and it counts nevertheless.
+/// Least refused share at which a window with refused samples counts nevertheless.
 const REFUSED_SHARE_MIN: f64 = 0.9;
 /// Distance in m over which position and speed are compared.
 const COMPARED_M: f64 = 200.0;
@@ -32,7 +32,7 @@ const MASSES_MIN: f64 = 5.0;
 /// Figures of the samples; every ratio is 1 in right units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Figures {
-    /// Acceleration over what the forces and the gradient would give.
+    /// Acceleration over the acceleration that the forces and the gradient would give.
     pub slopes: Slopes,
     /// Distance by position, counted in the direction of travel, over distance by speed.
     pub distance_ratio: Option<f64>,

@@ -1,9 +1,8 @@
 //! Forces as seen by the acceleration, by least squares over windows of motion.
 //!
-//! In the mean of a window of a few seconds, (1 + gamma) dv/dt = T/m - B/m - g i - p - q v². With
-//! right units the factors of traction T, brake B and gradient i are 1; p and q are whatever the
-//! resistance is, so that only pronounced accelerations reveal the forces and a wrong declared
-//! resistance changes nothing.
+//! In the mean of a window of a few seconds, (1 + gamma) dv/dt = T/m - B/m - g i - p - q v². With right units the
+//! factors of traction T, brake B and gradient i are 1. The resistance p + q v² is free, so that only pronounced
+//! accelerations reveal the forces and a wrong declared resistance changes nothing.
 
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use nalgebra::{SMatrix, SVector};
@@ -36,8 +35,8 @@ pub struct WindowMean {
     pub speed_mps: f64,
 }
 
-/// By how much the acceleration exceeds what the reported traction, brake and gradient would give,
-/// where the motion determines it; 1 in right units.
+/// Acceleration over the acceleration that the reported traction, brake and gradient would give, where the motion
+/// determines it; 1 in right units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Slopes {
     /// Of the traction force.
@@ -51,7 +50,7 @@ pub struct Slopes {
 /// The factor of one quantity as least squares give it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FittedFactor {
-    /// Acceleration over what the reported quantity would give.
+    /// Acceleration over the acceleration that the reported quantity would give.
     pub factor: f64,
     /// Its standard deviation, were the windows' errors independent.
     pub std: f64,
@@ -71,7 +70,7 @@ impl FittedFactor {
 /// Sums over the windows lately, or over all of a recorded run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WindowBalance {
-    /// Share of what stands in the sums that is kept when a window comes in.
+    /// Share of the sums that is kept when a window comes in.
     keep: f64,
     gram: SMatrix<f64, COLUMNS, COLUMNS>,
     with_inertia: SVector<f64, COLUMNS>,

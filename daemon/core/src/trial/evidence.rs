@@ -1,29 +1,28 @@
 //! Evidence that one model predicts better than another, valid at every look.
 //!
 //! Each trip gives a score between -1 and 1: (e0² - e1²) / (e0² + e1²) with the open-loop errors
-//! of the model in force, e0, and of its rival, e1. The hypothesis to be refuted is that the rival
-//! takes less from the error than the least gain that is worth a change.
+//! of the model in force, e0, and of its rival, e1. The hypothesis to be refuted is that the rival reduces the error by
+//! less than the least gain that is worth a change.
 //!
-//! The evidence against it is an e-process: the factor by which a bet of a fixed share on each trip
-//! grows. While the hypothesis holds no bet grows on average, whatever came before, so that one may
-//! look after every trip (Waudby-Smith, Ramdas: *Estimating means of bounded random variables by
-//! betting*, 2024). A new bet begins at each trip, so that a rival which becomes better only in winter is
-//! found in winter; the sum of all reaches M no earlier than after M trips on average while the
-//! hypothesis holds (Shin, Ramdas, Rinaldo: *E-detectors*, 2024). M is what the configuration
-//! calls `trips_between_mistakes`.
+//! The evidence against it is an e-process: the factor by which a bet of a fixed share on each trip grows. While the
+//! hypothesis holds no bet grows on average, regardless of the trips before, so that one may look after every trip
+//! (Waudby-Smith, Ramdas: *Estimating means of bounded random variables by betting*, 2024). A new bet begins at each
+//! trip, so that a rival which becomes better only in winter is found in winter; the sum of all bets reaches M no
+//! earlier than after M trips on average while the hypothesis holds (Shin, Ramdas, Rinaldo: *E-detectors*, 2024). M is
+//! `trips_between_mistakes` in the configuration.
 
 use serde::{Deserialize, Serialize};
 
 /// Shares that are bet on each trip; the e-process values are averaged over them.
 const BETS: [f64; 9] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
-/// E-process value beyond which counting on adds nothing more.
+/// E-process value beyond which further counting adds nothing.
 const E_VALUE_MAX: f64 = 1e100;
 /// Probability that the confidence sequence ever misses the truth: the sequence holds with 95 %.
 const MISS: f64 = 0.05;
 /// The largest weight of a trip in the confidence sequence.
 const WEIGHT_MAX: f64 = 0.5;
 
-/// A greater ratio of two errors says no more than that nothing bounds it.
+/// A greater ratio of two errors says only that nothing bounds it.
 pub const RATIO_MAX: f64 = 100.0;
 
 /// Returns the score of a trip: 1 when the rival leaves nothing of the error, -1 when the model in force

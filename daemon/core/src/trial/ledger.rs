@@ -79,12 +79,12 @@ const SAMPLES_MAX: usize = (Restart::WINDOW_S / STEP_MIN_S) as usize + 2;
 pub struct WindowError {
     /// Of the speed, over the window's moving samples.
     pub speed: SpeedError,
-    /// Of the distance by the predicted speed against the distance by position, over the window's length, in
-    /// m/s; what a wrong wheel diameter shows. 0 where no position is known.
+    /// Of the distance by the predicted speed against the distance by position, over the window's length, in m/s; it
+    /// shows a wrong wheel diameter. 0 where no position is known.
     pub distance_error_mps: f64,
 }
 
-/// Predicts by one model what the samples of a window should show.
+/// Predicts the samples of a window by one model.
 pub struct OpenLoop {
     pub(super) train: Arc<TrainModel>,
     resolver: ForceResolver,
@@ -115,7 +115,7 @@ impl OpenLoop {
         }
     }
 
-    /// Ends the window: what the model leaves of it, nothing where nothing can be simulated.
+    /// Ends the window and returns the error of the model over it, 0 where nothing can be simulated.
     pub fn close(&mut self) -> WindowError {
         let samples = std::mem::replace(&mut self.samples, Vec::with_capacity(SAMPLES_MAX));
         let Ok(recording) = OpenLoopRecording::new(samples) else {

@@ -1,12 +1,11 @@
-//! Models on trial: which of several predicts a train's motion better, judged while it runs.
+//! Models on trial: which of several models predicts a train's motion better, judged while it runs.
 //!
 //! The model in force and its rivals predict the same samples open loop, restarted every 60 s
 //! ([`ledger::OpenLoop`], by the simulation that judges every model, [`dynocar_model::simulate`]). Trip by trip
-//! their errors are compared, and the comparison is a bet whose winnings say at every moment how
-//! sure one may be ([`evidence`]): one may look as often as one likes. What the errors were on
-//! which day and where is kept beside ([`ledger`]).
+//! their errors are compared, and the comparison is a bet whose winnings say at every moment how sure one may be
+//! ([`evidence`]): one may look as often as one likes. The errors by day and place are kept next to it ([`ledger`]).
 //!
-//! Nothing here knows of threads, files or clocks; `dynocar` runs it beside the pipelines.
+//! This module knows no threads, files or clocks; `dynocar` runs it next to the pipelines.
 
 pub mod evidence;
 pub mod ledger;

@@ -10,20 +10,20 @@ use crate::pipeline::Pipeline;
 use crate::pipeline::admission::Admission;
 use crate::pipeline::motion::MOVING_MPS;
 
-/// Moving time in s of which a trip is made that compares models; shorter ones join the next.
+/// Moving time in s from which a trip is long enough to compare models; shorter trips join the next.
 const TRIP_MIN_S: f64 = 120.0;
 /// A controller that counts no trips is compared anew every this many s of motion.
 const TRIP_MAX_S: f64 = 1800.0;
 
 /// A model on trial.
 pub struct Rival {
-    /// Its hash.
+    /// Hash of the model.
     pub model: u64,
     /// The configured pipelines, with this model.
     pub pipelines: Vec<Pipeline>,
     /// Evidence of the trips for it, against the model in force.
     pub evidence: RivalEvidence,
-    /// Its errors.
+    /// Errors of the model.
     pub ledger: Ledger,
     /// The score of the newest trip that was compared.
     pub newest_score: Option<f64>,
@@ -35,7 +35,7 @@ pub struct Rival {
 }
 
 impl Rival {
-    /// Returns a model with what is known of it already.
+    /// Returns a model on trial with the evidence and errors that are known already.
     pub fn new(
         model: u64,
         open_loop: OpenLoop,
@@ -154,8 +154,8 @@ impl ModelTrials {
         has_compared
     }
 
-    /// A rival goes into force, and the model in force becomes a rival in its place. What was
-    /// measured of both stays, what was compared begins anew.
+    /// A rival goes into force, and the model in force becomes a rival in its place. The measured errors of both stay,
+    /// the comparison begins anew.
     pub fn change(&mut self, index: usize) {
         std::mem::swap(&mut self.in_force, &mut self.rivals[index]);
         for model in self.models() {

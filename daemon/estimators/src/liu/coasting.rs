@@ -1,11 +1,10 @@
 //! Regression data from coasting: least-squares slopes of half-overlapping segments.
 //!
-//! Liu 2018, figure 2: a segment is so long that the speed changes by 0.5 km/h, and the next
-//! starts in its middle. Three things are done otherwise than printed. A segment's length is set
-//! when it starts, from the resistance known so far: ended where a noisy speed first crosses its
-//! bound, it is too short on average and w0 comes out 1.7 % low. The regressors are the slopes of
-//! the integrals of 1, v, v² over the same samples, so that they weigh the speeds as the slope
-//! does. Spikes are refused before they reach a segment.
+//! Liu 2018, figure 2: a segment is so long that the speed changes by 0.5 km/h, and the next starts in its middle. This
+//! module departs from the paper in three ways. A segment's length is set when it starts, from the resistance known so
+//! far: if it ended where a noisy speed first crosses its bound, it would be too short on average and w0 would come out
+//! 1.7 % low. The regressors are the slopes of the integrals of 1, v, v² over the same samples, so that they weight the
+//! speeds as the slope does. Spikes are refused before they reach a segment.
 
 use dynocar_core::filter::FittedLine;
 use dynocar_core::pipeline::momentum::{
@@ -20,7 +19,7 @@ use crate::resistance::regression::CoastingSegment;
 
 /// Up to this force in N per kN of weight the train counts as coasting.
 const COASTING_MAX: f64 = 0.05;
-/// After so long a chain starts anew, so that its times and integrals stay small.
+/// After this time in s a chain starts anew, so that its times and integrals stay small.
 const CHAIN_MAX_S: f64 = 600.0;
 /// Shortest and longest half segment in s.
 const HALF_S: (f64, f64) = (0.4, 10.0);

@@ -1,4 +1,4 @@
-//! The recursions of Liu 2018 behind one face.
+//! The recursions of Liu 2018 behind one interface.
 
 use dynocar_core::filter::{Gaussian, Mils, NotPositiveDefinite, Penalty, Rls};
 use dynocar_core::pipeline::momentum::{DataSettings, PARAMETERS, UNKNOWNS};
@@ -11,21 +11,20 @@ use crate::resistance::settings::{INNOVATION_LENGTH_MAX, MilsSettings, RlsSettin
 #[derive(Clone, Debug)]
 #[expect(clippy::large_enum_variant, reason = "one stands in each pipeline, where it stays")]
 pub enum Solver {
-    /// All rows at once: the mixture of the noise bank itself.
+    /// All rows at once: the mixture of the noise bank itself is the estimate.
     Batch,
     /// Recursive least squares.
     Rls(Rls<UNKNOWNS>),
-    /// Multi-innovation least squares; with regularised RLS as its length of 1.
+    /// Multi-innovation least squares; regularised RLS is its case of length 1.
     Mils {
         /// The recursion.
         recursion: Mils<UNKNOWNS, INNOVATION_LENGTH_MAX>,
-        /// Where the interval varies with bad rows, the robust standard deviations beyond which a row
-        /// is one.
+        /// Robust standard deviations beyond which a row is bad, where the interval varies with bad rows.
         bad_beyond: Option<f64>,
     },
 }
 
-/// Variances of what is not known of the forces, by the settings.
+/// Variances of the errors of the forces, by the settings.
 fn force_variances(data: &DataSettings) -> [f64; UNKNOWNS - PARAMETERS] {
     let (scale, delay) = (data.force_scale_std.powi(2), data.force_delay_std_s.powi(2));
     [scale, scale, delay]

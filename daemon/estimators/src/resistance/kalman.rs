@@ -1,9 +1,9 @@
 //! The pipeline `resistance_kalman`: a robust filter over every sample.
 //!
-//! States are speed, disturbance and the unknowns of the regression. Where the least-squares
-//! pipelines wait for a block of samples, this one corrects at every sample, weighs each speed by
-//! Student's t, lets the coefficients drift, and follows the disturbance as it comes. How noisy
-//! the data are it takes from a least-squares estimator that runs in parallel.
+//! States are speed, disturbance and the unknowns of the regression. Where the least-squares pipelines wait for a block
+//! of samples, this one corrects at every sample, weights each speed by Student's t, lets the coefficients drift, and
+//! follows the disturbance as it changes. The noise of the data comes from a least-squares estimator that runs in
+//! parallel.
 
 use dynocar_core::filter::Gaussian;
 use dynocar_core::pipeline::judge::{InputState, Judgement};
@@ -26,7 +26,7 @@ use super::settings::KalmanSettings;
 
 const SPEED: usize = 0;
 const DISTURBANCE: usize = 1;
-/// Where the regression's unknowns begin.
+/// Index of the first unknown of the regression.
 const FIRST_UNKNOWN: usize = 2;
 const STATES: usize = FIRST_UNKNOWN + UNKNOWNS;
 
@@ -158,7 +158,7 @@ impl ResistanceKalman {
         }
     }
 
-    /// Returns the variance of the impulse by what is not known of when and where the forces acted.
+    /// Returns the variance of the impulse because the moments and places at which the forces acted are uncertain.
     fn impulse_variance(&self, before: &UnitSample, now: &UnitSample, change: f64) -> f64 {
         let data = &self.settings.data;
         let step_s = now.seconds_since(before);
@@ -195,8 +195,8 @@ impl ResistanceKalman {
         corrected.is_ok()
     }
 
-    /// Starts anew at a sample with what the least squares in parallel have learned: weighing by
-    /// Student's t, a filter far from the speeds would never come back to them.
+    /// Starts anew at a sample from the estimate of the least squares in parallel: with weights by Student's t, a
+    /// filter far from the speeds would never come back to them.
     fn recover(&mut self, now: &UnitSample) {
         self.consecutive_outliers = 0;
         let known =
@@ -242,8 +242,8 @@ impl ResistanceKalman {
         }
     }
 
-    /// Goes on with another solution, and with the speed and the disturbance that belong to it;
-    /// where the least squares do not know them, they stay what they are for given unknowns.
+    /// Goes on with another solution, and with the speed and the disturbance that belong to it; where the least squares
+    /// do not know these, they keep their relation to the unknowns.
     fn take_over(&mut self, solution: &RegressionSolution) {
         let Some(motion) = self.least_squares.motion().or_else(|| self.own_motion()) else {
             self.reset();

@@ -22,7 +22,7 @@ use crate::liu::solver::{Solver, bank_penalty};
 const MONITOR_ROWS: u32 = 60;
 /// Rows whose median gives the robust scale of the innovations.
 const SCALE_ROWS: usize = 31;
-/// Rows before the median is believed.
+/// Rows before the median is used.
 const SCALE_ROWS_MIN: usize = 8;
 /// The median of |x| for a standard normal x.
 const NORMAL_MEDIAN: f64 = 0.6745;
@@ -247,7 +247,7 @@ impl ResistanceLeastSquares {
         snapshot: &mut ParameterSnapshot,
     ) -> Judgement {
         let reason = match self.obstacle {
-            // Without a single row, what is missing says more than that rows are few.
+            // Without a single row, the missing quantity is more informative than the small number of rows.
             Some(obstacle) if self.bank.count() == 0.0 => obstacle,
             _ => report.reason,
         };

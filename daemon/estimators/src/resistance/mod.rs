@@ -1,13 +1,13 @@
 //! Davis a, b, c by least squares (Liu 2018), from coasting or from measured forces.
 //!
-//! # Layout, in the order a sample takes
+//! # Layout, in the order in which a sample passes
 //!
 //! - [`dynocar_core::pipeline::momentum`]: samples to blocks of momentum; `regression`: blocks, and coasting
 //!   segments, as observations
 //! - `noise_model`, `noise_bank`: observations to independent rows, and how noisy they are
 //! - `solver` and `coasting` of `crate::liu`: the paper's recursions and data
 //! - `report`: bounds, excitation, status
-//! - `least_squares`: the pipeline around all of it
+//! - `least_squares`: the pipeline around these parts
 //! - `kalman`: the robust filter over every sample, with a least-squares pipeline in parallel
 
 mod kalman;

@@ -1,9 +1,8 @@
 //! The noise of the rows, learned jointly with the parameters.
 //!
-//! How much of a residual is noise of the speed and how much a slow force that the model does
-//! not know (wind, errors of the gradient profile) decides both the weights of the rows and what
-//! the estimate is worth. A small bank of noise models runs side by side, and their solutions
-//! are mixed by their likelihood.
+//! A residual is partly noise of the speed and partly a slow force that the model does not know (wind, errors of the
+//! gradient profile). The proportion decides both the weights of the rows and the accuracy of the estimate. A small
+//! bank of noise models runs side by side, and their solutions are mixed by their likelihood.
 
 use dynocar_core::filter::Gaussian;
 use dynocar_core::filter::bank::{Bank, Mixture};
@@ -19,13 +18,13 @@ const STDS_N_PER_KN: [f64; 6] = [0.01, 0.03, 0.1, 0.3, 1.0, 3.0];
 /// Correlation times in s: a gust, a gradient section, a change of wind or weather.
 const TIMES_S: [f64; 3] = [10.0, 60.0, 400.0];
 const MODELS: usize = 1 + STDS_N_PER_KN.len() * TIMES_S.len();
-/// Until the rows show it: a disturbance of 0.1 N/kN over 60 s.
+/// Model that counts as likeliest until the rows show another: a disturbance of 0.1 N/kN over 60 s.
 const LIKELIEST_AT_FIRST: usize = 1 + 2 * TIMES_S.len() + 1;
-/// Rows after which the penalty, which forgetting takes off too, is made up for.
+/// Rows after which the part of the penalty that forgetting has removed is added again.
 const RENEWAL_ROWS: u32 = 50;
-/// Probability beforehand that there is no disturbance; the others share the rest.
+/// Prior probability that there is no disturbance; the other models share the rest.
 const UNDISTURBED_PRIOR: f64 = 0.95;
-/// Probability of the models that widen the intervals of a filter in parallel with the bank.
+/// Probability of the set of models that widen the intervals of a filter in parallel with the bank.
 const CREDIBLE: f64 = 0.99;
 /// Models of less weight than this are left out of the mixture.
 const WEIGHT_MIN: f64 = 1e-4;
@@ -91,7 +90,7 @@ impl NoiseBank {
         }
     }
 
-    /// Adds what is known of the unknowns from elsewhere to every model, a row of unit variance.
+    /// Adds knowledge of the unknowns from another source to every model, as a row of unit variance.
     pub fn know(&mut self, features: &Unknowns, observed: f64) {
         for model in self.models.hypotheses_mut() {
             model.information.add_knowledge(features, observed);

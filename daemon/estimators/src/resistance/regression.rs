@@ -1,5 +1,5 @@
-//! The observations of the linear regression of [`dynocar_core::pipeline::momentum`], and one model
-//! of their noise, with the least squares that follow from it.
+//! The observations of the linear regression of [`dynocar_core::pipeline::momentum`], and one model of their noise,
+//! with the resulting least squares.
 
 use dynocar_core::filter::{Propagation, Sighting, SquareRootInformation, Whitener};
 use dynocar_core::pipeline::momentum::{
@@ -25,7 +25,7 @@ pub struct RegressionSolution {
 /// Speed in m/s, then disturbance in N/kN, as affine functions of the unknowns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AffineMotion {
-    /// Their values were all unknowns 0.
+    /// Their values for unknowns of 0.
     pub at_zero: Vector2<f64>,
     /// Their derivatives by the unknowns.
     pub gain: SMatrix<f64, STATES, UNKNOWNS>,
@@ -198,7 +198,7 @@ impl RegressionNoise {
         Some(WhiteRow { features, observed: columns[0] })
     }
 
-    /// Takes in what is seen of an observation that the model has moved to.
+    /// Takes in the sighting of an observation that the model has moved to.
     pub fn accept(&mut self, seen: &Sighting<STATES, COLUMNS>, forgetting: f64) {
         let Ok(row) = self.whitener.take(seen) else { return };
         self.information.forget(forgetting);

@@ -20,11 +20,11 @@ const ROWS_MIN: f64 = 12.0;
 const SHARE_STD_MAX: f64 = 0.15;
 /// Share of w0 that a coefficient's standard deviation may reach while it counts as excited.
 const EXCITED_SHARE: f64 = 0.25;
-/// A slow force of more than this share of w0 that the model does not know is structure.
+/// A slow unknown force above this share of w0 shows that the model lacks something.
 const DISTURBANCE_SHARE_MAX: f64 = 0.1;
-/// Twice the log-likelihood ratio beyond which that force is no chance.
+/// Twice the log-likelihood ratio beyond which such a force is not chance.
 const DISTURBANCE_EVIDENCE_MIN: f64 = 10.0;
-/// Standard deviations beyond which the force now is no chance.
+/// Standard deviations beyond which the present force is not chance.
 const DISTURBANCE_STDS_MAX: f64 = 4.0;
 
 /// Mean and range of the speeds behind the rows.

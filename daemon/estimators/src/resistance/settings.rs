@@ -19,8 +19,7 @@ settings! {
     /// Settings of `rls`.
     #[derive(Copy)]
     RlsSettings {
-        /// Weight that a row keeps at every new one; what the new row does not inform on is not
-        /// forgotten. 1 forgets nothing.
+        /// Weight that a row keeps at every new one, in the direction of the new row only. 1 forgets nothing.
         forgetting: f64 = 0.9998 => (0.5 to 1);
         /// Variance of the start, p0 in Liu 2018, in (N/kN)² of scaled parameters.
         start_variance: f64 = 1e4 => (0.001 to 1000000000);
@@ -33,7 +32,7 @@ settings! {
     /// Settings of `regularised_rls`, `mils` and `v_mils`.
     #[derive(Copy)]
     MilsSettings {
-        /// Innovation length p, 1 to 8; `regularised_rls` has 1 whatever is set here.
+        /// Innovation length p, 1 to 8; `regularised_rls` always has 1.
         innovation_length: u32 = 4 => (1 to 8);
         /// lambda of the criterion `lambda/2 |theta|^2`, see [`LsSettings::lambda`].
         lambda: f64 = 0.005 => (0 to 1000000);

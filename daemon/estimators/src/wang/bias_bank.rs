@@ -1,8 +1,8 @@
 //! Kalman filters [v, 1/m, bias] side by side, one for each way in which a bias may behave.
 //!
-//! Effects that the declared model lacks act like an acceleration: a gradient error stays for minutes, wind grows
-//! with the speed, a gust lasts seconds. One noise for all of them is either too trusting in wind or too timid in
-//! calm. Each filter therefore assumes one behaviour, and the evidence of the innovations weighs them.
+//! Effects that the declared model lacks act like an acceleration: a gradient error stays for minutes, wind grows with
+//! the speed, a gust lasts seconds. A single noise model for all of them would trust the model too much in wind or too
+//! little in calm. Each filter therefore assumes one behaviour, and the evidence of the innovations weights it.
 
 use dynocar_core::filter::bank::{Bank, Mixture};
 use dynocar_core::filter::{Gaussian, NotPositiveDefinite};
@@ -23,7 +23,7 @@ pub const BIAS: usize = 2;
 /// Number of behaviours.
 pub const MODELS: usize = 8;
 
-/// Logarithm of the least weight against the best: any behaviour can come back.
+/// Logarithm of the least weight relative to the best: any behaviour can come back.
 const LOG_WEIGHT_MIN: f64 = -30.0;
 /// Conversion of forces into acceleration.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,7 +74,7 @@ pub struct BiasBank {
     dynamics: Dynamics,
     behaviours: Bank<Behaviour, MODELS>,
     forgetting: f64,
-    /// Step in s that the behaviours know what is kept over.
+    /// Step in s for which the behaviours hold their kept share.
     kept_step_s: f64,
 }
 
@@ -162,8 +162,8 @@ impl BiasBank {
         &self.behaviours.likeliest().filter
     }
 
-    /// Takes a measured speed into every filter that does not hold it for an outlier; gives what
-    /// the filter made of it that has the most evidence now.
+    /// Takes a measured speed into every filter for which it is not an outlier; returns the innovation of the filter
+    /// that has the most evidence afterwards.
     ///
     /// A speed that is an outlier under one behaviour may be as expected under another, which
     /// knows of forces that jump: each judges for itself, and the evidence is taken of all.

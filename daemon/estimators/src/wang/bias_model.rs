@@ -7,20 +7,20 @@ use super::known_motion::KnownMotion;
 
 /// Speed in m/s at which the bias of a behaviour that grows with speed is stated.
 const GROWTH_REFERENCE_MPS: f64 = 20.0;
-/// Least shape at which an error of the map is taken for such a bias.
+/// Least shape at which an error of the map counts as such a bias.
 const SHAPE_MIN: f64 = 0.25;
 
-/// Effect of the error of the map's gradients in a step: see [`gradient_error_kept`].
+/// Effect of the error of the map's gradients over a step: see [`gradient_error_kept`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MapError {
-    /// Its standard deviation in m/s²; 0 where nobody states one.
+    /// Standard deviation of the effect in m/s²; 0 where no error is declared.
     pub std_mps2: f64,
-    /// Share of it that is still there after the step.
+    /// Share of the effect that is still there after the step.
     pub keep: f64,
 }
 
 impl MapError {
-    /// Over a step in s that begins with a motion; `mps2_per_permille` turns gradients into
+    /// Returns the effect over a step in s that begins with a motion; `mps2_per_permille` turns gradients into
     /// accelerations.
     pub fn over(motion: &KnownMotion, step_s: f64, mps2_per_permille: f64) -> Self {
         if motion.gradient_std_permille <= 0.0 {
@@ -51,12 +51,13 @@ impl BiasModel {
         BiasModel { std_mps2, time_s, grows_with_speed }
     }
 
-    /// Returns a behaviour that lasts for ever also believes that forces run straight between samples.
+    /// Returns whether the behaviour lets forces jump between samples; one that lasts for ever takes them for straight
+    /// there.
     pub fn knows_of_jumps(&self) -> bool {
         self.time_s.is_finite()
     }
 
-    /// Returns the variance in (m/s)² of what a step misses because the acceleration changes by so much over it.
+    /// Returns the variance in (m/s)² of the error of a step because the acceleration changes by so much over it.
     pub fn jump_variance(&self, change_mps2: f64, step_s: f64) -> f64 {
         if self.knows_of_jumps() { jump_variance(change_mps2, step_s) } else { 0.0 }
     }
@@ -66,7 +67,7 @@ impl BiasModel {
         (-step_s / self.time_s).exp()
     }
 
-    /// Returns the variance in (m/s²)² of what comes to the bias while a share of it stays.
+    /// Returns the variance in (m/s²)² of the noise that renews the bias while a share of it stays.
     pub fn noise_variance(&self, keep: f64) -> f64 {
         self.std_mps2 * self.std_mps2 * (1.0 - keep * keep)
     }
@@ -77,7 +78,7 @@ impl BiasModel {
         self.std_mps2.hypot(self.of_map(map_std_mps2, speed_mps))
     }
 
-    /// Returns the share of the bias that stays over a step and the variance of what comes to it, where a share
+    /// Returns the share of the bias that stays over a step and the variance of the noise that renews it, where a share
     /// `keep` of it would stay but for the map's error.
     ///
     /// Bias and error are one process here: its variance is the sum of the two, its correlation over the

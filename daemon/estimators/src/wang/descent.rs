@@ -4,8 +4,8 @@ use nalgebra::{SMatrix, SVector};
 
 /// The mean square of `target - features · coefficients` over all samples so far.
 ///
-/// It is kept as the sums that it depends on, so that a step along the gradient over every
-/// sample costs the same after ten samples and after 28,000, and nothing is stored.
+/// Only the sums that it depends on are stored, so that a step along the gradient over every sample costs the same
+/// after ten samples and after 28,000.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeanSquare<const N: usize> {
     gram: SMatrix<f64, N, N>,

@@ -1,4 +1,4 @@
-//! The regression that the equation of motion becomes when it is integrated.
+//! The regression that results from integrating the equation of motion.
 //!
 //! With u = m_ref / m, q = g / (1000 (1 + gamma)) and the coefficients theta of z1, z2, z3,
 //!
@@ -6,12 +6,12 @@
 //! v(t) + q ∫ known dt = level + u ∫ F / (m_ref (1 + gamma)) dt - q Σ theta_j ∫ phi_j(v) dt
 //! ```
 //!
-//! where `known` is the gradient and every declared resistance beyond the basic one, so that z2
-//! and z3 are what curves and tunnels add to the declaration of them.
+//! where `known` is the gradient and every declared resistance beyond the basic one, so that z2 and z3 are the
+//! resistance of curves and tunnels beyond the declared one.
 //!
-//! Wang 2022 fits eq. (11)-(18) to a differentiated speed, whose noise at 5 Hz is five hundred
-//! times the acceleration that 0.02 N/kN makes. The integrals hold the same equation with the
-//! noise of the speed itself: white, and once per sample.
+//! Wang 2022 fits eq. (11)-(18) to a differentiated speed, whose noise at 5 Hz is five hundred times the acceleration
+//! that 0.02 N/kN causes. The integrals express the same equation with the noise of the speed itself: white, and once
+//! per sample.
 
 use dynocar_core::filter::DriftingLevel;
 use dynocar_core::filter::drifting_level::{DriftStep, LEVEL, PARAMETERS};
@@ -75,7 +75,7 @@ impl Regressors {
 /// Integrals since the start of an unbroken piece of motion, or their rates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Integrals {
-    /// Of what each parameter multiplies, in m/s; 0 at the level.
+    /// Of the factor of each parameter, in m/s; 0 at the level.
     row: RegressorRow,
     /// Of the deceleration by gradient and declared resistance, in m/s.
     known_mps: f64,
@@ -125,7 +125,7 @@ pub struct IntegralStep {
     pub push_change_mps2: f64,
     /// Effect of the map's error.
     pub map: MapError,
-    /// Variance in (m/s)² of what comes to the level under any assumption.
+    /// Variance in (m/s)² of the noise of the level under any assumption.
     pub noise_variance: f64,
 }
 
@@ -201,8 +201,7 @@ impl BiasHypothesis {
         }
     }
 
-    /// Absorbs an equation; gives the logarithm of its likelihood, up to what is common to all
-    /// assumptions.
+    /// Absorbs an equation; returns the logarithm of its likelihood, up to a constant that all assumptions share.
     pub fn absorb(&mut self, row: &RegressorRow, value: f64, weight: f64) -> f64 {
         let innovation = self.regression.absorb(row, value, weight);
         let evidence =

@@ -24,14 +24,14 @@ use super::integrals::{
 use super::known_motion::{KnownMotion, LearningSet};
 use super::line_resistance::{DEFAULT_REFERENCE_RADIUS_M, LineResistance};
 
-/// Updates between two looks at the slope of the resistance.
+/// Updates between two calculations of the slope of the resistance.
 const REFRESH_EVERY: u32 = 50;
 
 /// Learns z1, z2, z3 and the mass together, see [`super::integrals`].
 ///
-/// Levels and, at stops, the mass are marginalised exactly; what the legs showed of the
-/// resistances adds up. Several assumptions on the unexplained acceleration run side by side,
-/// and the one with the most evidence is published.
+/// Levels and, at stops, the mass are marginalised exactly; the information of the legs between stops on the
+/// resistances adds up. Several assumptions on the unexplained acceleration run side by side, and the one with the most
+/// evidence is published.
 #[derive(Clone, Debug)]
 pub struct JointLeastSquares {
     pub(super) settings: JointLeastSquaresSettings,
@@ -228,9 +228,8 @@ impl JointLeastSquares {
         self.last = Some((expected, rates));
     }
 
-    /// Returns a step with what comes to the level in addition to the bias: what the trapezoid misses, and what
-    /// the noise of the speed does in the features. There it moves the resistance, and with it
-    /// the integral, by a random walk.
+    /// Returns a step with the noise of the level in addition to the bias: the error of the trapezoid, and the effect
+    /// of the speed's noise on the features, where it moves the resistance, and with it the integral, by a random walk.
     fn step(
         &mut self,
         last: &(KnownMotion, Integrals),
@@ -347,10 +346,10 @@ settings! {
 }
 
 impl JointLeastSquaresSettings {
-    /// Returns the behaviours of the unexplained acceleration: none; slow in proportion to speed; small
-    /// and large, each slow and gusty. A constant is z1's to explain, so that 'none' stays far
-    /// below what a leg measures of an acceleration, 1e-5 m/s²: otherwise every leg would have a
-    /// constant of its own, and what the legs show together would count as less than it is.
+    /// Returns the behaviours of the unexplained acceleration: none; slow in proportion to speed; small and large, each
+    /// slow and gusty. A constant is z1's to explain, so that 'none' stays far below the accuracy of a leg's
+    /// acceleration, 1e-5 m/s²: otherwise every leg would have a constant of its own, and the joint evidence of the
+    /// legs would count as less than it is.
     pub fn bias_models(&self) -> [BiasModel; JOINT_MODELS] {
         let model =
             |share: f64, time_s, grows| BiasModel::new(share * self.bias_std_mps2, time_s, grows);

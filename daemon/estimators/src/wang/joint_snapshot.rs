@@ -12,7 +12,7 @@ use super::integrals::{INVERSE_MASS, POLYNOMIALS, RegressorRow, UNKNOWNS};
 use super::joint::JointLeastSquares;
 use super::known_motion::LearningSet;
 
-/// Used samples below which nothing is said.
+/// Number of used samples below which no estimate is reported.
 const SAMPLES_MIN: u64 = 50;
 /// Shares of the highest speed at which a, b and c are judged.
 const JUDGED_AT: [f64; 3] = [0.1, 0.5, 0.9];

@@ -20,9 +20,9 @@ use super::known_motion::{Inertia, KnownMotion};
 
 /// Samples over which the evidence for a behaviour of the bias is remembered.
 const EVIDENCE_MEMORY: f64 = 3000.0;
-/// Used samples below which nothing is said of the mass, unless they reach over `MOVED_MIN_S`.
+/// Number of used samples below which no mass is reported, unless they reach over `MOVED_MIN_S`.
 const SAMPLES_MIN: u64 = 50;
-/// Motion in s from which few samples are enough, where a second or more lies between them.
+/// Motion in s after which few samples are enough, where a second or more lies between them.
 const MOVED_MIN_S: f64 = 20.0;
 /// Share by which a declared mass has to change to be followed; load weighing is not steadier.
 const DECLARED_CHANGE_MIN: f64 = 0.02;
@@ -320,8 +320,8 @@ pub struct Settling {
 }
 
 impl Settling {
-    /// Takes in a step in s between two accelerations in m/s² by the force, with the variance in
-    /// (m/s)² of the measured speed: what leaves less open than that is no jump.
+    /// Takes in a step in s between two accelerations in m/s² by the force, with the variance in (m/s)² of the measured
+    /// speed: a change that leaves a smaller uncertainty than that is no jump.
     pub fn step(&mut self, from_mps2: f64, to_mps2: f64, step_s: f64, noise_variance: f64) {
         let change_mps2 = to_mps2 - from_mps2;
         if jump_variance(change_mps2, step_s) > noise_variance {
@@ -332,7 +332,7 @@ impl Settling {
         self.impulse_mps += 0.5 * step_s * (from_mps2 + to_mps2).abs();
     }
 
-    /// Returns whether what a jump left open is small against what the force has done since.
+    /// Returns whether the uncertainty that a jump left is small against the impulse of the force since.
     pub fn is_settled(&self) -> bool {
         self.impulse_mps >= IMPULSE_MIN * self.jump_mps
     }

@@ -1,5 +1,5 @@
 //! Motion for the estimators of mass: the values taken from a sample, the effect of its forces on a train of a
-//! reference mass, and which of the three resistances a piece of motion informs on.
+//! reference mass, and which of the three resistances a piece of motion gives information on.
 
 use dynocar_core::pipeline::Outcome;
 use dynocar_core::pipeline::motion::BRIDGED_MAX_S;
@@ -25,7 +25,7 @@ pub struct KnownMotion {
     /// Everything known that retards in proportion to the weight, in N/kN: see
     /// [`ResolvedSample::known_n_per_kn`].
     pub known_n_per_kn: f64,
-    /// Standard deviation in ‰ of the gradient in it; 0 where nobody states one.
+    /// Standard deviation in ‰ of the gradient in it; 0 where none is declared.
     pub gradient_std_permille: f64,
     /// Mean of 1/R along the train in 1/m; 0 where no curves are known.
     pub curvature_per_m: f64,

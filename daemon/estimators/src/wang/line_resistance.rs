@@ -1,17 +1,17 @@
-//! Basic, curve and tunnel resistance as functions of speed, and the polynomials that they are learned in.
+//! Basic, curve and tunnel resistance as functions of speed, and the polynomials in which they are learned.
 
 use dynocar_model::train::{Davis, TrainModel};
 use nalgebra::{Matrix3, Vector3};
 
 use super::known_motion::KnownMotion;
 
-/// Resistance of a train on a line, in N/kN: Wang 2022, eq. (5), (9), (10), each polynomial
-/// weighted by how much of it acts.
+/// Resistance of a train on a line, in N/kN: Wang 2022, eq. (5), (9), (10), with each polynomial weighted by the share
+/// of it that acts.
 ///
-/// The paper's curve resistance z2 knows no radius. Here it holds at a reference radius and
-/// goes with 1/R, as all curve formulas do; on a line of equal radii the two are the same.
-/// All of it comes in addition to the declaration of curves, tunnels and the rest
-/// ([`KnownMotion::known_n_per_kn`]), which acts in any case: the paper declares none.
+/// The paper's curve resistance z2 knows no radius. Here it holds at a reference radius and is proportional to 1/R, as
+/// in all curve formulas; on a line of equal radii the two are the same. z2 and z3 come in addition to the declared
+/// resistance of curves, tunnels and the rest ([`KnownMotion::known_n_per_kn`]), which always acts: the paper declares
+/// none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineResistance {
     /// z1: basic resistance.
@@ -63,9 +63,9 @@ pub const DEFAULT_REFERENCE_RADIUS_M: f64 = 500.0;
 
 /// The shifted Legendre polynomials of v / scale, orthonormal over speeds from 0 to the scale.
 ///
-/// On raw powers of a speed the squares of the regressors differ by a factor of 10⁸ in km/h
-/// and 10⁵ in m/s, and gradient descent creeps along the weak directions; here they differ by
-/// what the driven speeds make of it.
+/// On raw powers of a speed the squares of the regressors differ by a factor of 10⁸ in km/h and 10⁵ in m/s, and
+/// gradient descent creeps along the weak directions; here they differ only as the distribution of the driven speeds
+/// makes them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpeedBasis {
     /// Speed in m/s that the basis is normalised by.

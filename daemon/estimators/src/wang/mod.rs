@@ -1,11 +1,11 @@
-//! Wang 2022: resistance on open track, in curves and in tunnels, and the mass: the paper's method, and ours for
-//! whoever knows one of the two exactly. Where neither is known, [`dynocar_core::pipeline::train_kalman`] is better.
+//! Wang 2022: resistance on open track, in curves and in tunnels, and the mass: the paper's method, and ours for a
+//! train of which one of the two is known exactly. Where neither is known, [`dynocar_core::pipeline::train_kalman`] is
+//! better.
 //!
 //! - `descent`, `staged`: the paper's stages, by normalised gradient descent on sums over all samples
-//! - [`JointLeastSquares`]: all of it together, on [`integrals`] of motion
+//! - [`JointLeastSquares`]: resistances and mass together, on [`integrals`] of motion
 //! - [`MassKalman`]: the mass by Kalman filters [v, 1/m, bias], a [`bias_bank`] of them
-//! - [`known_motion`], [`line_resistance`], [`bias_model`]: what a sample gives,
-//!   and the parts of the model
+//! - [`known_motion`], [`line_resistance`], [`bias_model`]: the values taken from a sample, and the parts of the model
 
 pub mod bias_bank;
 pub mod bias_model;

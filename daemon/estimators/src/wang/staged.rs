@@ -19,7 +19,7 @@ use super::descent::MeanSquare;
 use super::known_motion::{Inertia, KnownMotion, LearningSet};
 use super::line_resistance::{DEFAULT_REFERENCE_RADIUS_M, LineResistance, SpeedBasis};
 
-/// Used samples below which nothing is said.
+/// Number of used samples below which no estimate is reported.
 const SAMPLES_MIN: f64 = 50.0;
 /// Samples under force from which a mass is published.
 const MASS_SAMPLES_MIN: f64 = 25.0;
@@ -43,8 +43,8 @@ const BRACKET_MAX: f64 = 0.02;
 
 /// Learns z1 on open track, z2 in curves, z3 in tunnels at the declared mass, and then the mass.
 ///
-/// The acceleration is the differentiated speed, as in the paper's section 3. z2 and z3 are
-/// what their samples leave over z1 (Algorithm 1, lines 11 to 13).
+/// The acceleration is the differentiated speed, as in the paper's section 3. z2 and z3 are fitted to the residuals of
+/// their samples beyond z1 (Algorithm 1, lines 11 to 13).
 #[derive(Clone, Debug)]
 pub struct StagedDescent {
     settings: StagedDescentSettings,

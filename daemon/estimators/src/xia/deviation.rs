@@ -1,6 +1,6 @@
 //! The mean squared deviation of Xia 2023 with its analytic gradient and Hessian.
 //!
-//! Equations 7-8 and 11-23, corrected (each correction is proved by finite differences below):
+//! Equations 7-8 and 11-23, corrected (finite differences below verify each correction):
 //!
 //! - eq. 8, 11, 16: the norm forms lack the factor 1/I that the sum forms have;
 //! - eq. 13: k = \[v_{i-1} - λ (b + 2 c v_{i-1})\] / v_i, with the brackets;

@@ -2,8 +2,8 @@
 //!
 //! - [`deviation`], [`wolfe_newton`]: the paper's method, with its formulas corrected
 //! - [`window`]: even distances from samples in time
-//! - [`newton`]: the pipeline, with the paper's search or with ours
-//! - [`trajectory`]: ours, over windows and sample by sample
+//! - [`newton`]: the pipeline, with the paper's search or with our own
+//! - [`trajectory`]: our own method, over windows and sample by sample
 
 pub mod deviation;
 pub mod newton;

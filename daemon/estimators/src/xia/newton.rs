@@ -197,7 +197,7 @@ impl TrajectoryNewton {
         }
     }
 
-    /// Compares the newest speed with what the fit before predicted for it.
+    /// Compares the newest speed with the prediction of the fit before.
     fn judge_prediction(&mut self) {
         let segment = self.window.segment();
         let (Some((end_mps, end_variance)), Some(step), Some(measured_mps)) =
@@ -314,8 +314,8 @@ settings! {
         window: u32 = 20 => (5 to 5000 "steps");
         /// Distance in m between points.
         interval_m: f64 = 100.0 => (1 to 10000 "m");
-        /// Standard deviations of the declared coefficients, as a share of each; they bind what a
-        /// window does not determine.
+        /// Standard deviations of the declared coefficients, as a share of each; they bind directions that a window
+        /// does not determine.
         prior_relative_std: f64 = 0.5 => (above 0);
         /// Standard deviation of the measured speed in m/s; learned from the residuals when absent.
         speed_noise_mps: Option<f64> = None => (above 0);

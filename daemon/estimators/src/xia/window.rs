@@ -8,17 +8,16 @@ use crate::xia::trajectory::step::{StepRule, TrajectoryStep};
 
 /// The newest steps of unbroken motion, each about as long as the sampling distance.
 ///
-/// The paper samples every 100 m; a controller samples in time. Samples are therefore gathered
-/// until the distance is reached: the step's driving force is their mean over distance for
-/// eq. 7 (the same work) and over time for the time rule (the same impulse), and the speed at
-/// its end is the sample's own.
+/// The paper samples every 100 m; a controller samples in time. Samples are therefore gathered until the distance is
+/// reached: the step's driving force is the mean of their forces over distance for eq. 7 (the same work) and over time
+/// for the time rule (the same impulse), and the speed at its end is the last sample's own.
 #[derive(Clone, Debug)]
 pub struct StepWindow {
     rule: StepRule,
     interval_m: f64,
     steps: Vec<TrajectoryStep>,
     speeds_mps: Vec<f64>,
-    /// Time in s of each step, and variance in (m/s)² of what it misses as forces jump.
+    /// Time in s of each step, and variance in (m/s)² of its error because forces may jump.
     missed: Vec<(f64, f64)>,
     open: OpenStep,
 }

@@ -1,9 +1,9 @@
 //! Newton's method with Wolfe steps at the bounds and random restarts: Algorithm 1 of Xia 2023.
 //!
-//! Kept faithful, weaknesses included, as the yardstick for [`crate::xia::trajectory::fit`]: the Hessian is
-//! positive definite at none (cruise) to a fifth (full speed profile) of random parameters, so
-//! that eq. 10 often climbs; v_0 is the first measured speed with its noise; restarts are a
-//! lottery. Where the paper leaves things open:
+//! The paper's algorithm is kept as it is, weaknesses included, as the yardstick for [`crate::xia::trajectory::fit`]:
+//! the Hessian is positive definite at none (cruise) to a fifth (full speed profile) of random parameters, so that eq.
+//! 10 often climbs; v_0 is the first measured speed with its noise; restarts are a lottery. Where the paper leaves a
+//! choice:
 //!
 //! - step 11 as printed restarts after every iteration that has not converged, which no search
 //!   survives; as in the text, this one restarts when the parameters no longer move;

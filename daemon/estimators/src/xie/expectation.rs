@@ -10,9 +10,9 @@ use dynocar_core::pipeline::braking::engine::BrakingObservation;
 use dynocar_core::pipeline::braking::motion::{self, DISTANCE, MotionNoise, StepInputs};
 use nalgebra::{SMatrix, SVector};
 
-/// A way to take the expectation.
+/// A method for the expectation.
 pub trait Expectation: Send {
-    /// Returns the gradient and curvature of Q at the model's share.
+    /// Returns the gradient and curvature of Q at the model's share of the demand.
     ///
     /// # Errors
     ///
@@ -252,7 +252,7 @@ pub struct ObservedWindow {
     pub first: Gaussian<2>,
 }
 
-/// A window with a value of the coefficient: what an E-step needs.
+/// A window with a value of the coefficient: the input of an E-step.
 ///
 /// The coefficient is kept as its share of the demand, which is the same thing while the cylinder
 /// pressure is constant, as in the papers, and stays constant while the brake is being applied.
@@ -269,8 +269,8 @@ pub struct WindowModel<'a> {
 }
 
 impl WindowModel<'_> {
-    /// Returns the share that acts, and its derivative by the share: above 1 the printed cap lets the
-    /// demand act, whatever the share.
+    /// Returns the share that acts, and its derivative by the share: above 1 the printed cap lets exactly the demand
+    /// act.
     pub fn acting(&self) -> (f64, f64) {
         if self.has_printed_cap && self.share >= 1.0 { (1.0, 0.0) } else { (self.share, 1.0) }
     }

@@ -1,6 +1,6 @@
 //! Sliding-window expectation maximisation (Xie 2019, section 2; Jin 2020, section 3).
 //!
-//! The steps are the papers'; where the printed form cannot work, this one differs:
+//! The steps are the papers'; this module differs where the printed form cannot work:
 //!
 //! - The process noise in the E- and M-steps is Gaussian with the variance of the papers'
 //!   uniform noise. With the uniform density itself, Q is constant where it is finite, and that

@@ -49,8 +49,8 @@ settings! {
         slide: usize = 5;
         /// Iterations end when the coefficient changes by less, as a share of the demand.
         tolerance: f64 = 1e-7 => (0 or more);
-        /// The coefficient before the first window; when absent the declared one, and for adhesion
-        /// what the brake would need.
+        /// The coefficient before the first window; when absent the declared one, and for adhesion the one that the
+        /// brake would need.
         initial: Option<f64> = None => (0 or more);
         /// Seed of the particles.
         seed: u64 = 1;

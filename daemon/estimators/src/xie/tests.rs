@@ -193,9 +193,8 @@ fn fifty_exact_iterations_converge_from_any_start() {
 
 #[test]
 fn fifty_iterations_with_twenty_particles_do_not_arrive_from_zero() {
-    // Too few particles reach where the measurements are, and the smoother can only weigh what
-    // the filter has drawn; the windows after the first hide it, since each starts where the one
-    // before it ended.
+    // Too few particles reach the measured states, and the smoother can only weight particles that the filter has
+    // drawn; the windows after the first hide it, since each starts where the one before it ended.
     for seed in 0..5 {
         let found = estimate(model(0.0), ParticleExpectation::new(20, STEPS, seed), seed).value;
         assert!(found < 0.75 * TRUTH, "seed {seed}: {found}");

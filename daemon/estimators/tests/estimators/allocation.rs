@@ -16,7 +16,7 @@ thread_local! {
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
 }
 
-/// The system's allocator, counting what each thread asks for.
+/// The system's allocator, counting the requests of each thread.
 struct Counting;
 
 // SAFETY: every call is passed on unchanged to the system's allocator; the counter is a plain

@@ -1,5 +1,5 @@
-//! Estimators from samples to snapshots, which allocate nothing (`allocation`, whose allocator all tests use: it
-//! counts by thread).
+//! Tests of the estimators from samples to snapshots. Pipelines allocate nothing (`allocation`, whose allocator all
+//! tests use: it counts by thread).
 
 mod allocation;
 mod braking;

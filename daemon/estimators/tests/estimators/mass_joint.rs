@@ -12,7 +12,7 @@ use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{Manoeuvre, Parameter, PipelineKind, Reason, RejectionReason, Status};
 use std::sync::Arc;
 
-/// A train that declares half the resistance that acts.
+/// A train that declares half of its true resistance.
 fn badly_declared() -> Arc<TrainModel> {
     let resistance = Davis { a: 1.0, b: 0.01, c: 0.0025 };
     Arc::new(TrainModel { resistance, ..(*train()).clone() })

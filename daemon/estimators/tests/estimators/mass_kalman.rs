@@ -1,4 +1,4 @@
-//! Mass by Kalman filters: what is learned, when, and what bad input does.
+//! Mass by Kalman filters: estimates, the time that they take, and the effect of bad input.
 
 use crate::mass_common::{
     Admitted, LEG, Simulation, assert_finite, feed, garbage, snapshot, train,

@@ -1,4 +1,4 @@
-//! Staged learning as Wang 2022 has it.
+//! Staged learning as in Wang 2022.
 
 use std::sync::Arc;
 

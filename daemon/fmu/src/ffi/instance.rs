@@ -133,11 +133,10 @@ pub enum Status {
 /// `fmi2CoSimulation` of `fmi2Type`.
 pub const CO_SIMULATION: c_int = 1;
 
-/// `fmi2CallbackLogger`: environment, name of the instance, status, category, format and what the
-/// format asks for.
+/// `fmi2CallbackLogger`: environment, name of the instance, status, category, format and the arguments of the format.
 pub type Logger = unsafe extern "C" fn(*mut c_void, FmiString, c_int, FmiString, FmiString, ...);
 
-/// `fmi2CallbackFunctions`: what the simulator lends an instance. Only the logger is used.
+/// `fmi2CallbackFunctions`: the functions that the simulator lends an instance. Only the logger is used.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct CallbackFunctions {

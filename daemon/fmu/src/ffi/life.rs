@@ -1,7 +1,7 @@
 //! The life of an instance, from instantiation over its steps to its end.
 //!
-//! Functions of the standard that `modelDescription.xml` does not promise: there, so that every
-//! simulator can load the library, and answered with an error in words.
+//! Some functions of the standard that `modelDescription.xml` does not promise exist nevertheless, so that every
+//! simulator can load the library; they answer with an error in words.
 
 #![allow(non_snake_case, reason = "the names are the standard's")]
 

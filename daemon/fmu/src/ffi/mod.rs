@@ -1,8 +1,8 @@
 //! The functions that a simulator calls, by the FMI standard 2.0 for co-simulation.
 //!
-//! Thin on purpose: each function checks its pointers and calls the [`Model`](crate::Model) behind the
-//! instance. What is refused is reported to the simulator's logger in words and answered by
-//! [`Status::Error`]; no panic crosses the boundary.
+//! Thin on purpose: each function checks its pointers and calls the [`Model`](crate::Model) behind the instance. A
+//! refusal is reported to the simulator's logger in words and answered by [`Status::Error`]; no panic crosses the
+//! boundary.
 //!
 //! # Layout
 //!
@@ -12,7 +12,7 @@
 //!
 //! # Safety
 //!
-//! All functions here share these conditions, and add none of their own; the standard sets them:
+//! All functions here have these conditions, set by the standard, and no others:
 //!
 //! - a component is NULL or comes from [`life::fmi2Instantiate`] and has not been freed, and no
 //!   other thread is in a call with it;

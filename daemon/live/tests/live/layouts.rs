@@ -1,5 +1,5 @@
-//! Every topic and field that a shipped layout shows is one that is served and recorded with the shipped configuration;
-//! viewers get as many samples as a picture needs.
+//! Every topic and field that a shipped layout shows is served and recorded with the shipped configuration; viewers get
+//! as many samples as a picture needs.
 
 use std::path::{Path, PathBuf};
 

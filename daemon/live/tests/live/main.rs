@@ -1,4 +1,4 @@
-//! The live view: the layouts shipped for its viewers, and its process beside a controller and a daemon.
+//! The live view: the layouts shipped for its viewers, and its process next to a controller and a daemon.
 
 mod layouts;
 mod process;

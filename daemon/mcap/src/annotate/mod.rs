@@ -1,5 +1,5 @@
-//! An explanation beside the data that it explains: a copy of a recording with the verdict, the effects
-//! where they act, the residual and the predicted speeds, at the moments at which the recording logs a dataset's runs.
+//! An explanation next to the data that it explains: a copy of a recording with the verdict, the effects where they
+//! act, the residual and the predicted speeds, at the moments at which the recording logs a dataset's runs.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -23,7 +23,7 @@ use super::schema::{fields_of, message};
 /// Why a recording is not annotated.
 #[derive(Debug, thiserror::Error)]
 pub enum AnnotateError {
-    /// It cannot be copied.
+    /// The recording cannot be copied.
     #[error(transparent)]
     Copy(#[from] CopyError),
     /// The explanation is of other data.
@@ -346,7 +346,7 @@ message! {
     }
 }
 
-/// The messages with their names, what they are and their fields.
+/// The messages with their names, meanings and fields.
 pub const MESSAGES: [(&str, &str, &[MessageField]); 4] = [
     (Verdict::NAME, Verdict::MEANING, Verdict::FIELDS),
     (Effect::NAME, Effect::MEANING, Effect::FIELDS),

@@ -8,9 +8,9 @@
 //!                          - weight_kN gradient
 //! ```
 //!
-//! with the gradient in ‰ and the means taken along the train. [`ForceResolver`] gives
-//! everything but w0(v), which is the quantity that estimators look for; [`ForceBalance::acceleration_mps2`] gives the acceleration.
-//! Each part is a law of [`crate::terms`], with its declared numbers in the train and the line.
+//! with the gradient in ‰ and the means taken along the train. [`ForceResolver`] gives everything but w0(v), the
+//! quantity that estimators look for; [`ForceBalance::acceleration_mps2`] gives the acceleration. Each part is a law of
+//! [`crate::terms`], with its declared numbers in the train and the line.
 
 mod resolver;
 
@@ -18,7 +18,7 @@ use super::terms::rotating;
 use super::train::TrainModel;
 pub use resolver::{ForceResolver, ResolvedSample, ValidSample};
 
-/// Returns the acceleration in m/s² that 1 N/kN of resistance takes away, or 1 ‰ of climbing.
+/// Returns the deceleration in m/s² that 1 N/kN of resistance, or 1 ‰ of climbing, causes.
 #[inline]
 pub fn mps2_per_n_per_kn(rotating_mass_factor: f64) -> f64 {
     TrainModel::weight_kn(1.0) / (1.0 + rotating_mass_factor)
@@ -31,7 +31,7 @@ pub struct ForceBalance {
     pub mass_kg: f64,
     /// gamma.
     pub rotating_mass_factor: f64,
-    /// Traction less brake, and whatever else acts in N.
+    /// Traction less brake and all other forces in N.
     pub force_n: f64,
     /// Gradient in ‰ along the travel.
     pub gradient_permille: f64,

@@ -17,7 +17,7 @@ use crate::terms::{
 use crate::track::Track;
 use crate::train::{Corrections, TrainModel};
 
-/// A sample that passed validation, with what its predecessors say about it.
+/// A sample that passed validation, with its relation to the samples before it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ValidSample<'a> {
     /// The sample as it came.
@@ -128,7 +128,7 @@ impl ResolvedSample {
         Some(self.control_force_n()? - self.weight_kn * self.known_n_per_kn()?)
     }
 
-    /// Returns a train of 100 t with gamma 0.06 that coasts on the level at 20 m/s: what tests start from.
+    /// Returns a train of 100 t with gamma 0.06 that coasts on the level at 20 m/s: the start of many tests.
     pub fn coasting() -> Self {
         ResolvedSample {
             time_ns: 0,
@@ -157,7 +157,7 @@ impl ResolvedSample {
     }
 }
 
-/// Puts what acts on the train behind a speed that is late.
+/// Delays everything that acts on the train by as much as the speed is late.
 fn put_behind(late: &mut LateSpeed, resolved: &mut ResolvedSample) {
     let at = (resolved.time_ns, resolved.segment);
     let forces = resolved.traction_force_n.zip(resolved.brake_force_n);
@@ -175,7 +175,7 @@ fn put_behind(late: &mut LateSpeed, resolved: &mut ResolvedSample) {
         late.cylinder_pressure_pa(at, resolved.brake_cylinder_pressure_pa);
 }
 
-/// Looks up what the declared model knows of the forces at a sample.
+/// Looks up the forces that the declared model gives at a sample.
 #[derive(Clone, Debug)]
 pub struct ForceResolver {
     train: Arc<TrainModel>,
@@ -299,7 +299,7 @@ impl ForceResolver {
         }
     }
 
-    /// Returns every declared term of resistance at a sample; what c and w0 scale is left open.
+    /// Returns every declared term of resistance at a sample; c and w0, which some of them scale, are left open.
     fn declared_resistance(&self, sample: &ResolvedSample) -> Resistance {
         let train = &*self.train;
         let known = &train.corrections;

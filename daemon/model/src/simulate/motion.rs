@@ -9,8 +9,8 @@ pub struct SimulatedMotion {
     pub speed_mps: f64,
 }
 
-/// No train is faster, in m/s; a model with a negative resistance, as an optimiser may try it,
-/// stays finite.
+/// No train is faster than this in m/s. A model with a negative resistance, which an optimiser may try, stays finite by
+/// it.
 pub const SPEED_MAX_MPS: f64 = 250.0;
 /// A longer step in s is divided.
 pub const STEP_MAX_S: f64 = 1.0;

@@ -48,7 +48,8 @@ impl Restart {
 const START_SAMPLES: usize = 5;
 /// They lie within this time in s: over a longer one the forces say too little.
 const START_SPAN_S: f64 = 2.5;
-/// A starting speed farther in m/s from what the samples after it say is an outlier.
+/// A starting speed is an outlier when it differs by more than this in m/s from the speed that the samples after it
+/// imply.
 const START_TOLERANCE_MPS: f64 = 1.0;
 
 /// Predicted measured speeds of one run; keeps its memory from one simulation to the next.

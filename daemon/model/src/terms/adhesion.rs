@@ -1,17 +1,18 @@
-//! A brake force that the rail does not carry: achieved = min(reported, mu · weight), or a share
-//! of the reported one. It belongs to certain runs and is declared nowhere.
+//! A brake force that the rail does not carry: achieved = min(reported, mu · weight), or a share of the reported force.
+//! It belongs to certain runs and is not declared in any file.
 
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Least, Parameter, Suspect};
 
-/// The cap mu.
+/// The cap mu of the first law.
 pub const CAP: [Parameter; 1] = [Parameter::new("adhesion", (0.005, 0.5), 0.0005)];
-/// The share.
+/// The share of the second law.
 pub const RATIO: [Parameter; 1] = [Parameter::new("achieved_ratio", (0.05, 1.0), 0.005)];
 /// A brake that achieves more of its force is as good as declared.
 pub const RATIO_LEAST: f64 = 0.97;
-/// Standard deviation, as a share of it, of a brake force that pressure and disc should exert: few exert it.
+/// Standard deviation of the brake force computed from pressure and disc, as a share of it: few brakes exert it
+/// exactly.
 pub const DECLARED_BRAKE_STD: f64 = 0.05;
 
 /// Returns the brake force in N that the rail carries.

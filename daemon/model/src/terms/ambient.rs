@@ -1,6 +1,6 @@
 //! Basic resistance that follows the outside temperature: w0 (1 + beta (T - reference)).
 //!
-//! A sample without temperature has that of the last one that had; before the first nothing is
+//! A sample without temperature takes that of the last sample with one; before the first temperature nothing is
 //! corrected.
 
 use dynocar_shared::vocabulary::EffectKind;
@@ -15,7 +15,7 @@ const ZERO_DEGC_K: f64 = 273.15;
 /// The standard atmosphere's 15 °C in K, for which coefficients are declared.
 pub const REFERENCE_K: f64 = Corrections::NONE.ambient_reference_k;
 
-/// Air density alone gives -0.0035 per kelvin; grease makes it more.
+/// Air density alone gives -0.0035 per kelvin; cold grease adds to it.
 pub const PARAMETERS: [Parameter; 1] = [Parameter::new("w0_per_k", (-0.05, 0.05), 0.0005)];
 /// A smaller change per kelvin does not matter over the temperatures of a year.
 pub const LEAST_PER_K: f64 = 0.001;

@@ -1,4 +1,5 @@
-//! Cold bearings that warm up: a is larger by delta exp(-t / tau), t from when they were cold.
+//! Cold bearings that warm up: a is larger by delta exp(-t / tau), with t counted from the time at which they were
+//! cold.
 //!
 //! They are cold at the first sample, after a gap of half an hour, and where a clock that was set
 //! back leaves unknown how long the train stood. A new trip soon after the last finds them warm.
@@ -13,9 +14,9 @@ pub const PARAMETERS: [Parameter; 2] = [
     Parameter::new("delta_a_n_per_kn", (0.0, 20.0), 0.02),
     Parameter::new("tau_s", (40.0, 3000.0), 5.0),
 ];
-/// Time constant in s that is assumed before any is known.
+/// Time constant in s that is assumed before one is known.
 pub const TYPICAL_TAU_S: f64 = 200.0;
-/// Standard deviation of what bearings that warm up usually add at the start, as a share of a.
+/// Standard deviation of the resistance that bearings usually add at the start, before they are warm, as a share of a.
 pub const USUAL_STD: f64 = 0.05;
 /// Bearings are cold again after a gap of this many s between two samples.
 pub const COLD_AGAIN_S: f64 = 1800.0;

@@ -1,17 +1,17 @@
-//! A brake that exerts another force than it reports, and one that does not release: a force that builds up from
-//! some instant on, which belongs to certain runs and is declared nowhere.
+//! A brake that exerts another force than it reports, and one that does not release: a force that builds up from some
+//! instant on, belongs to certain runs and is not declared in any file.
 
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Least, Parameter, Suspect, adhesion};
 pub use crate::train::numbers::BRAKE_GAIN as GAIN;
 
-/// A brake that is nearer to its report is as good as declared.
+/// A brake whose force is nearer to its report is as good as declared.
 pub const GAIN_LEAST: f64 = adhesion::DECLARED_BRAKE_STD;
 
 /// The force builds up over this time in s.
 pub const BUILD_UP_S: f64 = 10.0;
-/// The force.
+/// The dragging force.
 pub const PARAMETERS: [Parameter; 1] = [Parameter::new("force_n", (0.0, 3e5), 20.0)];
 
 /// Returns the share of the force `since_s` seconds after the onset.

@@ -5,9 +5,9 @@ use dynocar_shared::vocabulary::EffectKind;
 use super::{Least, Parameter, Resistance, Suspect};
 pub use crate::train::numbers::CURVE_CONSTANT as CONSTANT;
 
-/// Total k is between none and about eight times the usual.
+/// The total k lies between 0 and about eight times the usual value.
 pub const PARAMETERS: [Parameter; 1] = [Parameter::new("k_n_per_kn_m", (0.0, 5000.0), 20.0)];
-/// A k that differs by less from the declared one is within what formulas differ by.
+/// A k that differs by less from the declared one is within the spread of the usual formulas.
 pub const LEAST_N_PER_KN_M: f64 = 100.0;
 
 /// Standard deviation of a declared k, as a share of it: formulas differ.

@@ -10,13 +10,13 @@ pub const PARAMETERS: [Parameter; 2] = [
     Parameter::new("delay_s", (0.0, DELAY.rule.range[1]), 0.05),
     Parameter::new("lag_s", (0.0, 8.0), 0.05),
 ];
-/// Name of their sum, which runs show far better than either.
+/// Name of the sum of delay and lag, which runs show far better than either of them.
 pub const TOGETHER: &str = "delay_and_lag_s";
 /// A shorter delay and lag together in s are within a cycle of most controllers.
 pub const LEAST_S: f64 = 0.15;
-/// Standard deviation in s of what a force acts behind its report.
+/// Standard deviation in s of the delay between a report and its force.
 pub const USUAL_STD_S: f64 = 0.2;
-/// Delay in s that the live monitor takes for a matter of stamps.
+/// Delay in s that the live monitor ascribes to the time stamps.
 pub const TOLERATED_S: f64 = 0.3;
 
 /// Samples kept: six seconds of the fastest controllers.
@@ -27,7 +27,7 @@ const LAG_MIN_S: f64 = 1e-3;
 /// Traction and brake force in N.
 pub type Forces = [f64; 2];
 
-/// Numbers of the last seconds, and what of them holds now: a dead time, then a first-order lag.
+/// Numbers of the last seconds, and the ones in effect now: a dead time, then a first-order lag.
 #[derive(Clone, Debug)]
 pub struct DelayLine<const N: usize> {
     delay_s: f64,
@@ -36,7 +36,7 @@ pub struct DelayLine<const N: usize> {
     past: Vec<(f64, [f64; N])>,
     next: usize,
     count: usize,
-    /// How many are newer than what held last.
+    /// How many are newer than the number that was in effect last.
     newer: usize,
     segment: u32,
     origin_ns: i64,
@@ -66,8 +66,8 @@ impl<const N: usize> DelayLine<N> {
         (self.count, self.next, self.newer, self.last) = (0, 0, 0, None);
     }
 
-    /// The numbers that hold at a time in ns behind those that are reported then; `None` while they
-    /// are not. A new motion segment forgets what was before it.
+    /// Returns the numbers in effect at a time in ns, which come after those reported then; `None` while none are
+    /// reported. A new motion segment erases the numbers before it.
     pub fn acting(
         &mut self,
         (time_ns, segment): (i64, u32),
@@ -76,8 +76,8 @@ impl<const N: usize> DelayLine<N> {
         self.acting_unless((time_ns, segment), reported, |_| false)
     }
 
-    /// The same; what comes out of the dead time and is `held` moves nothing: it holds as it is, and the
-    /// lag begins from none behind it.
+    /// The same, but numbers that come out of the dead time and are `held` move nothing: they take effect as they are,
+    /// and the lag starts from 0 after them.
     pub fn acting_unless(
         &mut self,
         (time_ns, segment): (i64, u32),
@@ -104,7 +104,7 @@ impl<const N: usize> DelayLine<N> {
     /// Returns the reported numbers at a time, linear between samples, the oldest before all of them.
     fn at(&mut self, time_s: f64) -> [f64; N] {
         let entry = |back: usize| self.past[(self.next + CAPACITY - 1 - back) % CAPACITY];
-        // Times grow: what held last has become one older, and what holds now is no older.
+        // Times grow: the number in effect last has become one older, and the one in effect now is no older.
         let mut back = (self.newer + 1).min(self.count - 1);
         while back > 0 && entry(back - 1).0 <= time_s {
             back -= 1;

@@ -1,19 +1,19 @@
-//! Descriptions of every term: the keys of its numbers in the files and their ranges, its estimated parameters, and
-//! how it is looked for while the train runs.
+//! Descriptions of every term: the keys of its numbers in the files and their ranges, its estimated parameters, and the
+//! way in which the monitor looks for it while the train runs.
 
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::extra::ExtraResistance;
 use crate::train::numbers::{Davis, Key};
 
-/// One entry of the files that a finding becomes.
+/// One entry that a finding makes in the files.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ModelEntry {
     /// A number of `train.toml`.
     Number(&'static Key, f64),
     /// A number of `[track]` that adds to a declared one.
     TrackNumber(&'static str, f64),
-    /// A list of `[track]` that stands alone.
+    /// A list of `[track]` that no other list may join: it is held only where the line declares none of that name.
     List(&'static str, Vec<Vec<f64>>),
     /// Further rows of a list of `[track]`.
     Rows(&'static str, Vec<Vec<f64>>),
@@ -21,7 +21,7 @@ pub enum ModelEntry {
     Extra(ExtraResistance),
 }
 
-/// A parameter of a term, as a fit knows it.
+/// A parameter of a term, as a fit uses it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
     /// Its name in the answer.

@@ -1,5 +1,5 @@
-//! Another mass than declared, between certain stops or for some time: everything that goes with
-//! the weight grows alike, traction and brake do not.
+//! Another mass than declared, between certain stops or for some time: every force in proportion to the weight grows
+//! alike, traction and brake do not.
 
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -9,9 +9,9 @@ use super::{Least, Parameter, Suspect};
 pub const LIST: &str = "masses";
 /// True over declared mass.
 pub const PARAMETER: Parameter = Parameter::new("mass_factor", (0.5, 2.0), 0.005);
-/// A smaller share of the mass is not worth a word.
+/// A smaller share of the mass is not worth reporting.
 pub const LEAST_SHARE: f64 = 0.012;
-/// Standard deviation of a mass that was weighed, or otherwise said of a run, as a share of it.
+/// Standard deviation of a mass that was weighed, or declared for a run, as a share of it.
 pub const WEIGHED_STD: f64 = 0.03;
 
 /// Unit: the share of the mass that is added.

@@ -1,10 +1,9 @@
 //! The physical terms of the model: one file holds one law with its numbers.
 //!
-//! A term says what its numbers do to the forces at a sample, where they stand in `train.toml` or
-//! `track.toml`, within which bounds they make sense, how large they must be to count, and what
-//! one unit of it does where the monitor looks for it. The daemon's forces, `explain`, the
-//! monitor, the simulator and the writer of the updated model all take the law from here, so that
-//! what was found is what is then applied, to the bit.
+//! A term defines the effect of its numbers on the forces at a sample, their keys in `train.toml` or `track.toml`, the
+//! bounds within which they make sense, the least size that counts, and the effect of one unit where the monitor looks
+//! for it. The daemon's forces, `explain`, the monitor, the simulator and the writer of the updated model all take the
+//! law from here, so that the law found and the law applied are the same, to the bit.
 
 pub mod adhesion;
 pub mod ambient;

@@ -1,4 +1,4 @@
-//! Further resistance at places, on the part of the train there.
+//! Additional resistance at locations, on the part of the train there.
 
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -20,7 +20,7 @@ pub fn profile(intervals_m: &[[f64; 2]], extra_n_per_kn: f64) -> Result<StepProf
     interval_profile(LIST, &intervals_m.iter().map(place).collect::<Vec<_>>())
 }
 
-/// A place resists.
+/// Adds the resistance of a location.
 #[inline]
 pub fn act(extra_n_per_kn: f64, resistance: &mut Resistance) {
     resistance.place_n_per_kn += extra_n_per_kn;

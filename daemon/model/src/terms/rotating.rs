@@ -1,4 +1,4 @@
-//! Rotating parts: inertial mass = mass (1 + gamma). Unlike the mass they feel no gradient.
+//! Rotating parts: inertial mass = mass (1 + gamma). Unlike other mass they add no weight.
 
 use dynocar_shared::vocabulary::EffectKind;
 

@@ -1,14 +1,14 @@
-//! A force by a law of the speed that no term follows: bands of speed, in each of which it may be another.
+//! A force by a law of the speed that no term follows: bands of speed, with a force of its own in each.
 //!
-//! Whatever the law is, if it depends on the speed and a, b, c do not follow it, then some band holds more or
-//! less of it than its neighbours. One band alone is no law, but it is a better account of such a force than a
-//! wind or a brake: what it explains best has no name.
+//! If a force depends on the speed in a way that a, b, c do not follow, then some band holds more or less of it than
+//! its neighbours. One band alone is no law, but it describes such a force better than a wind or a brake does: a force
+//! that a band explains best has no name.
 
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Least, Suspect, SuspectInput};
 
-/// Speed in m/s from the middle of a band to those of its neighbours, where it ends.
+/// Speed in m/s from the middle of a band to the middle of its neighbour, where the band ends.
 const WIDTH_MPS: f64 = 7.5;
 
 /// Returns the share of a band that a speed lies in; bands add up to 1 everywhere, the last has no end.
@@ -17,7 +17,7 @@ fn share(band: usize, speed_mps: f64) -> f64 {
     if band + 1 == BANDS.len() && place > 0.0 { 1.0 } else { (1.0 - place.abs()).max(0.0) }
 }
 
-/// 1 N/kN in a band.
+/// A suspect whose unit is 1 N/kN in a band.
 const fn of(unit: fn(&SuspectInput) -> f64) -> Suspect {
     Suspect {
         effect: EffectKind::Unknown,

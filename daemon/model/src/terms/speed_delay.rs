@@ -1,8 +1,8 @@
-//! A measured speed that is late: the true one of a dead time ago, behind a first-order lag.
+//! A measured speed that is late: the true speed of a dead time ago, after a first-order lag.
 //!
-//! Delay of the wheels' sensor, its filter and its bus. With such a speed everything else acts as it did when the
-//! speed was true: forces, gradient and every resistance. That distinguishes it from forces that act late, for
-//! those leave the gradient on time.
+//! The sensor of the wheels, its filter and its bus cause the delay. To match such a speed, forces, gradient and every
+//! resistance must all be taken from the moment at which the speed was true. That distinguishes it from forces that act
+//! late, which leave the gradient on time.
 
 use super::delay::{DelayLine, Forces};
 use super::wheel::STANDING_MPS;
@@ -42,7 +42,7 @@ impl LateSpeed {
         }
     }
 
-    /// Forgets what was before, behind another dead time and lag in s.
+    /// Forgets all numbers, and starts with another dead time and lag in s.
     pub fn restart(&mut self, delay_s: f64, lag_s: f64) {
         self.forces.restart(delay_s, lag_s);
         self.resisting.restart(delay_s, lag_s);

@@ -5,9 +5,9 @@ use dynocar_shared::vocabulary::EffectKind;
 use super::{Least, Parameter, Suspect};
 pub use crate::train::numbers::TRACTION_GAIN as GAIN;
 
-/// Beyond these a controller reports something else.
+/// Beyond these bounds a controller reports another quantity.
 pub const PARAMETERS: [Parameter; 1] = [Parameter::new("gain", (0.6, 1.6), 0.005)];
-/// Force sensors are good to this.
+/// Accuracy of force sensors.
 pub const LEAST: f64 = 0.01;
 
 /// Standard deviation of the scale of a reported force.

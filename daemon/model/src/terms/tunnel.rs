@@ -14,19 +14,19 @@ pub const PARAMETERS: [Parameter; 1] =
 /// A smaller share of c is within the accuracy of tunnel factors, which are tabulated to one decimal.
 pub const LEAST_SHARE_OF_C: f64 = 0.1;
 
-/// Tunnels of a length, weighted by the share of the train inside, resist.
+/// Adds the resistance of tunnels of a length, weighted by the share of the train inside.
 #[inline]
 pub fn act_by_length(n_per_kn_m: f64, length_m: Option<f64>, resistance: &mut Resistance) {
     resistance.tunnel_n_per_kn = n_per_kn_m * length_m.unwrap_or(0.0);
 }
 
-/// The share of the train inside tunnels; where none are known, none are assumed.
+/// Sets the share of the train inside tunnels; 0 where no tunnel is known.
 #[inline]
 pub fn enter(share: Option<f64>, resistance: &mut Resistance) {
     resistance.outside = 1.0 - share.unwrap_or(0.0);
 }
 
-/// c is larger by a factor for a share of the train.
+/// Raises c by a factor for a share of the train.
 #[inline]
 pub fn act_by_factor(c_factor: f64, share: Option<f64>, resistance: &mut Resistance) {
     resistance.c_share += share.unwrap_or(0.0) * (c_factor - 1.0);

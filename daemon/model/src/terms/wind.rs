@@ -6,7 +6,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use super::{Least, Parameter, Resistance, Suspect, SuspectInput};
 pub use crate::train::numbers::WIND_PLUS;
 
-/// Faster wind stops the trains.
+/// Faster wind stops rail traffic.
 pub const PARAMETER: Parameter = Parameter::new("wind_plus_mps", (-35.0, 35.0), 0.05);
 /// Root mean square in m/s of the winds along a line on ordinary days, at most.
 pub const EVERYDAY_MPS: f64 = 2.5;
@@ -14,10 +14,10 @@ pub const EVERYDAY_MPS: f64 = 2.5;
 pub const GUST_SHARE: f64 = 0.5;
 /// Time in s over which a gust lasts on the average, seen from a moving train.
 pub const GUST_TIME_S: f64 = 10.0;
-/// Less wind than this is in the noise of any day.
+/// A weaker wind is lost in the noise of any day.
 pub const LEAST_MPS: f64 = 1.0;
 
-/// The wind blows against a train in a direction of travel.
+/// Adds the headwind on a train in a direction of travel.
 #[inline]
 pub fn act(wind_plus_mps: f64, direction: f64, resistance: &mut Resistance) {
     resistance.headwind_mps += wind_plus_mps * direction;
@@ -40,7 +40,7 @@ pub const SUSPECT: Suspect = Suspect {
     unit: |seen| unit(seen, seen.direction),
 };
 
-/// The wind of one day: a headwind in one run, whichever way it goes.
+/// The wind of one day: a headwind in one run, in either direction of travel.
 pub const OF_THE_DAY: Suspect = Suspect { unit: |seen| unit(seen, 1.0), ..SUSPECT };
 
 /// Returns the addition of 1 m/s along the line, in N/kN.

@@ -1,8 +1,7 @@
 //! The line: gradient, curves and tunnels along the chainage.
 //!
-//! Every property acts along the train's length. Each is kept as a step profile with its
-//! cumulative sum, so that the mean over a train costs two look-ups whatever the number of
-//! entries.
+//! Every property acts along the train's length. Each is kept as a step profile with its cumulative sum, so that the
+//! mean over a train costs two look-ups for any number of entries.
 
 mod profile;
 
@@ -17,10 +16,11 @@ pub const TUNNELS: &str = "tunnels";
 /// The list of `[track]` that holds [start in m, end in m, extra in N/kN] of places that resist.
 pub const RESISTANCE: &str = "resistance";
 
-/// Errors of a surveyed gradient further apart than this in m are their own: integral scale of a process along the line.
+/// Errors of a surveyed gradient that lie further apart than this in m are independent: integral scale of a process
+/// along the line.
 pub const GRADIENT_ERROR_FREE_M: f64 = 200.0;
 
-/// Returns the standard deviation of the mean of a gradient's error over a length in m, as a share of that at a place.
+/// Returns the standard deviation of the mean of a gradient's error over a length in m, as a share of that at a point.
 pub fn gradient_error_of_mean(length_m: f64) -> f64 {
     (GRADIENT_ERROR_FREE_M / length_m.max(GRADIENT_ERROR_FREE_M)).sqrt()
 }

@@ -20,8 +20,8 @@ impl FrictionBrake {
 }
 
 impl TrainModel {
-    /// Returns a train of which only mass and basic resistance are declared: a point without rotating
-    /// mass that nothing else holds back. Simulations set what else they need.
+    /// Returns a train of which only mass and basic resistance are declared: a point without rotating mass or any other
+    /// resistance. Simulations set everything else that they need.
     pub fn bare(name: &str, mass_kg: f64, resistance: Davis) -> Self {
         TrainModel {
             name: name.into(),

@@ -5,25 +5,25 @@ use super::EffortCurve;
 use super::rule::NumberRule;
 use crate::terms::extra::ExtraResistance;
 
-/// One number of a train as `train.toml` declares it.
+/// One number of a train, as `train.toml` declares it.
 #[derive(Clone, Copy, Debug)]
 pub struct Key {
     /// The table that holds it.
     pub table: &'static str,
-    /// Its name there.
+    /// Name of the number in that table.
     pub name: &'static str,
     /// Values that it may have.
     pub rule: NumberRule,
-    /// Its place in a train.
+    /// Its member of a train.
     pub of: fn(&mut TrainModel) -> Member<'_>,
 }
 
 /// A member of a train that holds a number.
 #[derive(Debug)]
 pub enum Member<'t> {
-    /// One that has a value in any case.
+    /// A member that has a value in any case.
     Number(&'t mut f64),
-    /// One that may be undeclared.
+    /// A member that may be undeclared.
     Optional(&'t mut Option<f64>),
     /// A count.
     Count(&'t mut u32),
@@ -193,9 +193,9 @@ numbers! {
 
     /// A drive that is known by its electric power.
     ///
-    /// Pulling, the wheels have the efficiency's share of what the drive takes; in regeneration the
-    /// drive gives back the same share of what the wheels feed: force = efficiency P / v for P > 0 and
-    /// P / (efficiency v) for P < 0.
+    /// Pulling, the wheels receive the efficiency's share of the drive's electric power; in regeneration the drive
+    /// returns the same share of the wheels' power: force = efficiency P / v for P > 0 and P / (efficiency v) for P <
+    /// 0.
     #[derive(Clone, Copy, Debug, PartialEq)]
     PowerTrain (USUAL) [.drive.get_or_insert(PowerTrain::USUAL)] {
         in "traction" {
@@ -264,7 +264,7 @@ numbers! {
             pressure_std: f64 = 0.0 => PRESSURE_STD, RELATIVE_STD;
             /// Standard deviation of a unit's efficiency.
             efficiency_std: f64 = 0.0 => EFFICIENCY_STD, RELATIVE_STD;
-            /// Standard deviation of what all units have in common, as weather and a batch of pads.
+            /// Standard deviation of the errors that all units have in common, such as weather or a batch of pads.
             common_std: f64 = 0.0 => COMMON_STD, RELATIVE_STD;
             /// Standard deviation of the train's mass.
             mass_std: f64 = 0.0 => MASS_STD, RELATIVE_STD;

@@ -1,9 +1,9 @@
-//! Rules for a number of a file: the values that it may have, and how a finding joins it.
+//! Rules for a number of a file: the values that it may have, and how a finding is combined with a declared value.
 
-/// How a number that was found comes to one that is declared already.
+/// How a number that was found is combined with one that is declared already.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Joined {
-    /// It takes its place.
+    /// The found number replaces the declared one.
     Replaced,
     /// They add up.
     Added,

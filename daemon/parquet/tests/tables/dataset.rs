@@ -1,4 +1,4 @@
-//! Parquet files of anybody in place of CSV.
+//! Parquet files of any program in place of CSV.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -89,7 +89,7 @@ fn numbers_truths_and_times_of_every_kind_become_numbers_and_what_is_missing_is_
         assert_eq!(numbers(&all, name), expected, "{name}");
     }
     assert!(all.iter().any(|it| it.name == "note" && it.values.is_none()));
-    // Times are given in the unit that is declared, whatever the file counts in.
+    // Times are returned in the declared unit, independent of the unit in the file.
     assert_eq!(numbers(&read(&path, &[("since", "s")]), "since"), some([-1.5, 0.0, 0.25]));
     let without = read(&path, &[("speed", "m/s"), ("force", "kN")]);
     assert!(without.iter().all(|it| it.values.is_none()), "the names state the choices");

@@ -1,4 +1,4 @@
-//! The Arrow schema, the columns and the page of the fields say the same.
+//! The Arrow schema, the columns and the page of the fields agree.
 
 use arrow_schema::Schema;
 use dynocar_mcap::columns::{EVENTS, RecordingColumn, RecordingRow, SAMPLES, SNAPSHOTS};

@@ -77,7 +77,7 @@ fn other_formats_broken_files_and_tables_of_others_are_named() {
     }
 }
 
-/// A table of samples with another column in the place of one, or without it; `layout` is what it says of itself.
+/// Writes a table of samples with one column replaced or left out; `layout` is the layout that it states.
 fn altered(path: &Path, from: &Path, column: &str, other: Option<ArrayRef>, layout: Option<&str>) {
     let builder = ParquetRecordBatchReaderBuilder::try_new(File::open(from).unwrap()).unwrap();
     let said = builder.metadata().file_metadata().key_value_metadata().cloned().unwrap();
@@ -195,7 +195,7 @@ fn a_file_whose_end_is_damaged_anywhere_is_refused_or_read_and_nothing_panics() 
     let whole = std::fs::read(recording(folder.path())).unwrap();
     let path = folder.path().join("damaged.parquet");
     let mut refused = 0;
-    // The account of what lies where, of which numbers are taken for granted.
+    // The footer: it lists the positions of all parts, and the library takes some of its numbers for granted.
     for index in whole.len().saturating_sub(3000)..whole.len() {
         let mut bytes = whole.clone();
         bytes[index] ^= 0x95;

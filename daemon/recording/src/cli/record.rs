@@ -13,7 +13,7 @@ use dynocar_transport::Host;
 use crate::record::{Keeping, RecorderSettings, Rotation, SYNC, record, request_keeping};
 use crate::train_channels::ChannelSelection;
 
-/// Record what a controller and the daemon write, as MCAP.
+/// Record the samples and snapshots of controller and daemon, as MCAP.
 #[derive(Debug, Args)]
 #[command(group(ArgGroup::new("rotation").args(["rotate_mib", "rotate_minutes"]).multiple(true)))]
 pub struct RecordArguments {
@@ -132,10 +132,10 @@ const PARTS: u32 = 60;
 /// The shortest and the longest time that a file of the ring takes.
 const PART: [Duration; 2] = [Duration::from_secs(10), Duration::from_secs(600)];
 
-/// Keep the last hours in a ring on disk, and for good what lies around a suspicion, a fault or a request.
+/// Keep the last hours in a ring on disk, and for good the minutes around a suspicion, a fault or a request.
 #[derive(Debug, Args)]
 pub struct FlightRecorderArguments {
-    /// The ring's folder, made where it is not there; what is kept lies below it in `kept`
+    /// The ring's folder, made where it is not there; kept files lie below it in `kept`
     folder: PathBuf,
     /// Hours that the ring reaches back
     #[arg(long, value_name = "N", default_value_t = 24.0, value_parser = hours)]

@@ -30,7 +30,7 @@ impl Configuration {
     ///
     /// # Errors
     ///
-    /// In words, what is not attached and why.
+    /// A sentence on the file that is not attached, and the reason.
     pub fn new(given: Option<&Path>, process: u32) -> Result<Self, String> {
         let named = match given {
             Some(path) => Some(path.to_path_buf()),
@@ -76,8 +76,8 @@ impl Configuration {
     }
 }
 
-/// Returns the model that the store of a configuration has put in force for a train; `None` where what the
-/// configuration declares is.
+/// Returns the model that the store of a configuration has put in force for a train; `None` where the declared model is
+/// in force.
 fn adopted(table: &Table, folder: &Path, train: i64) -> Result<Option<ModelText>, String> {
     let Some(directory) = store_of(table) else { return Ok(None) };
     let models = Store::at(&folder.join(directory)).train(TrainId(train as u64));

@@ -1,4 +1,4 @@
-//! The files of a recording: one, or many of which the oldest go.
+//! The files of a recording: one, or many, of which the oldest are removed.
 
 use std::cell::Cell;
 use std::io::{ErrorKind, Write};
@@ -39,7 +39,7 @@ impl Write for Counted {
     }
 }
 
-/// The file that is written, and what every new one has to begin with.
+/// The file that is being written, and the state that every new one begins with.
 pub struct RecordingFiles {
     storage: SharedStorage,
     output: PathBuf,
@@ -61,9 +61,9 @@ pub struct RecordingFiles {
 }
 
 impl RecordingFiles {
-    /// Begins the first file. With rotation its name is the output's with a number that is greater
-    /// than all that are there. Files are brought to the disk no more often than every `sync`, and a keeper
-    /// keeps for good what lies around the events that are reasons to.
+    /// Begins the first file. With rotation its name is the output's with a number that is greater than those of all
+    /// files there. Files are brought to the disk no more often than every `sync`, and a keeper keeps for good the
+    /// files around the events that are reasons to do so.
     ///
     /// # Errors
     ///

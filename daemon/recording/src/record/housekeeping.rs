@@ -1,8 +1,8 @@
-//! Care of a recorder's files besides writing: it syncs them to the disk, keeps them, and removes those that the ring no
-//! longer holds.
+//! Care of a recorder's files in addition to writing: bringing them to the disk, keeping them, and removing those that
+//! the ring no longer holds.
 //!
-//! A disk may take seconds for each of these. They are done in the order in which they were requested, in a
-//! thread of their own while a recorder runs, so that nobody who records waits for them.
+//! A disk may take seconds for each of these tasks. They are done in the order of the requests, in a thread of their
+//! own while a recorder runs, so that recording never waits for them.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -21,7 +21,7 @@ use dynocar_mcap::event::Event;
 /// A task of the housekeeping.
 #[derive(Debug)]
 pub enum Task {
-    /// Bring a file to the disk, into which this many items were written, files before it included.
+    /// Bring a file with this many new items to the disk, together with the files before it.
     Settle {
         /// The file.
         file: PathBuf,
@@ -33,12 +33,12 @@ pub enum Task {
         /// The file.
         file: PathBuf,
     },
-    /// Keep what lies around an event.
+    /// Keep the files around an event.
     Keep {
         /// The reason.
         event: Event,
     },
-    /// Remove what is too old or too much, but never this file.
+    /// Remove the files that are too old or too many, but never this one.
     RemoveOldest {
         /// The file that is written.
         written: PathBuf,
@@ -124,7 +124,7 @@ impl Housekeeping {
 
 /// Where it is done.
 enum HousekeepingThread {
-    /// At once, by whoever asks.
+    /// At once, in the thread of the caller.
     Here(Box<Housekeeping>),
     /// In a thread of its own, which ends when nobody can ask any more.
     Running(Sender<Task>, JoinHandle<()>),

@@ -1,9 +1,9 @@
 //! Files that a flight recorder keeps for good: those around a moment, under names of their own.
 //!
-//! A file is kept by giving it a second name (a hard link) in the folder of the event. So it is kept from
-//! that moment on, whatever happens to the recorder: the ring removes only the first name, and the file that
-//! is being written goes on growing under both. An event takes its name when its files and their names are on the
-//! disk, so that a power cut leaves it whole or not at all.
+//! A file is kept by giving it a second name (a hard link) in the folder of the event. It is kept from that moment on,
+//! even if the recorder dies: the ring removes only the first name, and the file that is being written grows under
+//! both. An event takes its name when its files and their names are on the disk, so that a power cut leaves it whole or
+//! not at all.
 
 use std::fs::{self, File, TryLockError};
 use std::io::{self, ErrorKind};
@@ -19,14 +19,14 @@ use super::kept_event::{self, KeptEvent, Reason, beside, forget_unfinished, kept
 use super::ring::Aged;
 use dynocar_mcap::event::{Event, EventKind};
 
-/// Beside the ring: the kept values.
+/// Folder in the ring's folder for the kept files.
 const KEPT_FOLDER: &str = "kept";
-/// In the ring's folder: that this moment is to be kept, and why.
+/// File in the ring's folder that requests to keep this moment, with the reason.
 const REQUEST_FILE: &str = "keep.request";
-/// In the ring's folder: held by the recorder that writes there.
+/// File in the ring's folder that the recorder writing there holds locked.
 const LOCK_FILE: &str = "recorder.lock";
 
-/// How much is kept around a moment, and in all.
+/// How much is kept around a moment, and altogether.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Keeping {
     /// Before the moment.
@@ -70,7 +70,7 @@ impl From<StorageError> for KeepError {
     }
 }
 
-/// Keeps what lies around a moment.
+/// Keeps the files around a moment.
 pub struct EventKeeper {
     storage: SharedStorage,
     ring: PathBuf,
@@ -93,7 +93,7 @@ impl std::fmt::Debug for EventKeeper {
     }
 }
 
-/// Returns true for an event around which a flight recorder keeps what it has: a suspicion, a fault, a request.
+/// Returns true for an event around which a flight recorder keeps its files: a suspicion, a fault, a request.
 pub fn is_reason(event: &Event) -> bool {
     match event.kind() {
         EventKind::SuspicionRaised

@@ -1,4 +1,4 @@
-//! An event that is kept: its folder, and the account of why it is.
+//! An event that is kept: its folder, and the record of the reasons.
 
 use std::collections::HashMap;
 use std::fs;
@@ -13,15 +13,15 @@ use serde::{Deserialize, Serialize};
 
 use dynocar_mcap::event::{Event, EventKind};
 
-/// In the folder of an event: why it is kept.
+/// File in the folder of an event with the reasons for keeping it.
 const EVENT_FILE: &str = "stretch.toml";
 
 /// Why and until when an event is kept.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct KeptEvent {
-    /// Files that are begun before belong to it, in whole s since 1970.
+    /// Files that are begun before this moment belong to the event, in whole s since 1970.
     until_unix_s: u64,
-    /// Why.
+    /// The reasons.
     #[serde(default)]
     pub reasons: Vec<Reason>,
     /// The same moment by the clock that nobody sets.
@@ -93,7 +93,7 @@ pub fn beside(path: &Path) -> PathBuf {
     path.with_file_name(format!(".{name}.part"))
 }
 
-/// Removes what a recorder that died did not finish: the files have their names in the ring.
+/// Removes the folders that a recorder that died did not finish: their files still have names in the ring.
 pub fn forget_unfinished(kept: &Path) {
     let folders = fs::read_dir(kept).into_iter().flatten().flatten().map(|it| it.path());
     let is_unfinished = |path: &PathBuf| {
@@ -106,7 +106,7 @@ pub fn forget_unfinished(kept: &Path) {
     }
 }
 
-/// Returns the event that ends last, by what its folder says.
+/// Returns the event that ends last, according to the record in its folder.
 pub fn newest(kept: &Path) -> Option<(PathBuf, KeptEvent)> {
     let now = Stamp::now();
     let folders = fs::read_dir(kept).ok()?.flatten().map(|it| it.path());

@@ -1,5 +1,5 @@
 //! The recorder: it writes the messages of the trains' channels into files, which can be read up to the last flush,
-//! whatever ends it.
+//! even after an abrupt end.
 
 mod configuration;
 mod files;
@@ -28,10 +28,10 @@ pub use files::RecordingFiles;
 pub use housekeeping::Rotation;
 pub use keeping::{EventKeeper, KeepError, Keeping, request as request_keeping};
 
-/// How often what was taken is handed to the system: what a kill costs at most.
+/// Time between two flushes of the messages to the system: the most that a kill costs.
 const FLUSH: Duration = Duration::from_millis(400);
-/// How often that is brought to the disk, unless somebody wants it otherwise: what a power cut costs is
-/// this, a flush, and the time that the disk takes.
+/// Time between two writes of the flushed data to the disk, unless the settings give another: a power cut costs this, a
+/// flush, and the time that the disk takes.
 pub const SYNC: Duration = Duration::from_secs(1);
 
 /// Contents and destination of a recording.
@@ -63,7 +63,7 @@ pub enum RecordError {
         /// The file.
         path: PathBuf,
     },
-    /// The system gives no thread for what a disk takes its time for.
+    /// The system gives no thread for the slow work of the disk.
     #[error("no thread can be started that brings files to the disk: {0}")]
     Thread(std::io::Error),
     /// A flight recorder cannot have its ring.
@@ -111,7 +111,7 @@ impl Recorded {
 ///
 /// # Errors
 ///
-/// See [`RecordError`]; what was written by then can be read.
+/// See [`RecordError`]; messages written by then can be read.
 pub fn record(settings: &RecorderSettings, stop: &AtomicBool) -> Result<Recorded, RecordError> {
     let folder = folder_of(&settings.output);
     let disk: SharedStorage = Arc::new(Disk);

@@ -1,8 +1,8 @@
-//! The files of a recording that rotates: their names, and how long ago they ended, whatever happens to the clock on the wall.
+//! The files of a recording that rotates: their names, and how long ago they ended, even when the wall clock is set.
 //!
-//! A file that this recorder ended has the age that the monotonic clock gives it. Those that were there before
-//! follow one another as closely as their dates say, but no file takes longer than a part of the ring may; they
-//! grow older while a recorder runs.
+//! A file that this recorder ended has its age by the monotonic clock. The files that were there before follow one
+//! another as closely as their dates say, but no file counts as longer than a part of the ring; their ages grow while a
+//! recorder runs.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -11,9 +11,9 @@ use std::time::{Duration, Instant, SystemTime};
 /// A file of the ring.
 #[derive(Clone, Debug)]
 pub struct Aged {
-    /// Where it is.
+    /// Path of the file.
     pub path: PathBuf,
-    /// Since it ended; nothing for the one that is written.
+    /// Time since it ended; zero for the file that is being written.
     pub age: Duration,
 }
 

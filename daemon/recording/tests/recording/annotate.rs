@@ -1,4 +1,4 @@
-//! An explanation beside the data: every moment of it lies where the recording has that moment.
+//! An explanation in a recording: every moment of it lies where the recording has that moment.
 
 use std::collections::HashMap;
 

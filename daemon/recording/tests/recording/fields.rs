@@ -1,4 +1,4 @@
-//! Messages, their tables and the page of the fields say the same.
+//! Messages, their tables and the page of the fields agree.
 
 use std::collections::HashSet;
 

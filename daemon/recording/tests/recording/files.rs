@@ -1,4 +1,4 @@
-//! Files that are broken, foreign or of another schema are named; what can be read of them is.
+//! Broken and foreign files, and files of another schema, are named; their readable part is read.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! A flight recorder keeps for good what lies around a moment, and nothing else.
+//! A flight recorder keeps for good the files around a moment, and nothing else.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -23,7 +23,7 @@ fn event(kind: EventKind) -> Event {
     Event { kind: kind as i32, train_id: 1, text: kind.name().into(), ..Default::default() }
 }
 
-/// The names in a folder, but for the stretch's own account.
+/// Returns the names of the recordings in a folder.
 fn names(folder: &Path) -> BTreeSet<String> {
     let entries = std::fs::read_dir(folder).unwrap().flatten();
     let names = entries.map(|it| it.file_name().into_string().unwrap());

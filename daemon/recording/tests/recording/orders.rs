@@ -1,5 +1,4 @@
-//! Recordings whose messages another tool has put into another order, written twice or merged, and those of several
-//! trains.
+//! Recordings whose messages another tool has reordered, written twice or merged, and recordings of several trains.
 
 use std::path::{Path, PathBuf};
 

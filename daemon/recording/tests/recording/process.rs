@@ -1,4 +1,4 @@
-//! The recorder as a process beside a controller and a daemon: killed, asked to end, out of disk.
+//! The recorder as a process next to a controller and a daemon: killed, asked to end, out of disk.
 
 use std::io::Read;
 use std::os::unix::process::CommandExt;
@@ -232,7 +232,7 @@ fn a_closed_pipe_is_no_failure_and_a_full_disk_is_reported_by_the_name_that_was_
 fn a_flight_recorder_keeps_what_lies_around_a_suspicion() {
     let site = TestSite::new(&["mass_kalman", "v_mils"]);
     let controller = Controller::start(&site, 1);
-    // A daemon's end of the channel, with nothing but what is suspected behind it.
+    // A daemon's end of the channel, which sends nothing but a suspicion.
     let transport = Transport::open(&site.host(), "monitor").unwrap();
     let snapshots = transport.sender::<ParameterSnapshot>(TRAIN).unwrap();
     let mut snapshot = ParameterSnapshot::empty();

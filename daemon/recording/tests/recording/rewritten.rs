@@ -1,4 +1,4 @@
-//! Recordings that other tools have written anew.
+//! Recordings that other tools have rewritten.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -16,7 +16,7 @@ use mcap::{Attachment, Compression, WriteOptions, Writer};
 
 const DEMO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/demo");
 
-/// Another tool: writes the attachments and the first messages anew.
+/// Another tool, which rewrites the attachments and the first messages.
 struct Tool {
     writer: Writer<BufWriter<File>>,
     channels: HashMap<String, u16>,

@@ -76,7 +76,7 @@ proptest! {
         let texts: Vec<(String, String)> =
             memory.names().map(|it| (it.to_owned(), memory.read(it).unwrap())).collect();
         let texts: Vec<(&str, &str)> = texts.iter().map(|it| (&it.0[..], &it.1[..])).collect();
-        // As text, for what is missing is no number.
+        // Compared as text, since a missing value is no number.
         let [one, other] = [Dataset::load(&memory), Dataset::load(&texts[..])]
             .map(|it| it.map(|it| format!("{it:?}")).map_err(|it| it.words));
         prop_assert_eq!(one, other);

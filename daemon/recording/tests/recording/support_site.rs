@@ -1,4 +1,4 @@
-//! A folder with a daemon and a controller, for what reads beside them.
+//! A folder with a daemon and a controller, for programs that read their channels.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,7 +14,7 @@ use dynocar_transport::{Host, Peer, Role, monotonic_now_ns};
 pub const TRAIN: TrainId = TrainId(1);
 const TRAIN_FILE: &str = "[train]\nname = \"t\"\nmass_t = 200.0\nlength_m = 120.0\ncars = 6\n\
      rotating_mass_factor = 0.08\n[resistance]\na = 1.9\nb = 0.03\nc = 0.0043\n";
-/// How long a test waits for what must happen before it calls it a hang.
+/// How long a test waits for an event that must happen before it calls it a hang.
 pub const WATCHDOG: Duration = Duration::from_secs(60);
 
 pub fn await_true(what: &str, mut condition: impl FnMut() -> bool) {

@@ -1,4 +1,4 @@
-//! Recorded snapshots are computed again to the bit, and what is not the same is found.
+//! Recorded snapshots are computed again to the bit, and differences are found.
 
 use std::path::PathBuf;
 

@@ -12,8 +12,8 @@ use crate::cli::text::{TextTable, line, short};
 use crate::config::{DaemonConfig, TrainConfig};
 use crate::shadow::rule::Adopt;
 
-/// Reads a configuration with the train and track files it names, and builds every estimator, so
-/// that a setting out of range is found here and not when the daemon starts.
+/// Reads a configuration with the train and track files that it names, and builds every estimator, so that a setting
+/// out of range is found here and not when the daemon starts.
 ///
 /// # Errors
 ///

@@ -6,7 +6,7 @@ const TRAIN: &str = "[train]\nmass_t=100\nlength_m=80\nrotating_mass_factor=0.05
     [resistance]\na=1\nb=0\nc=0\n";
 const TRACK: &str = "[track]\nname = 'line'\n";
 
-/// Returns a train's models in a directory that goes with the test.
+/// Returns a train's models in a directory that is removed after the test.
 fn empty() -> (tempfile::TempDir, TrainModels) {
     let directory = tempfile::tempdir().unwrap();
     let models = Store::at(&directory.path().join("models")).train(TrainId(1));

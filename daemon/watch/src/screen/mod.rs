@@ -1,6 +1,6 @@
 //! The screen, drawn from the state alone: it knows no clock and no channel.
 //!
-//! 80 x 24 hold everything; larger terminals get the resistance at more speeds and plots.
+//! 80 x 24 characters hold everything; larger terminals get the resistance at more speeds and plots.
 
 mod overview;
 mod plots;
@@ -16,11 +16,11 @@ pub use style::Palette;
 use crate::state::TrainState;
 use crate::words::{daemon, samples};
 
-/// Less than this shows nothing whole.
+/// A smaller terminal shows no table whole.
 const COLUMNS_MIN: u16 = 60;
 const ROWS_MIN: u16 = 20;
 
-/// The keys and the words.
+/// The keys and the terms.
 const HELP: &str = "\
 q, Esc, Ctrl-C    quit
 Tab, Shift-Tab    next train, train before
@@ -42,7 +42,7 @@ what the train's file declares.";
 /// Views of the screen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ScreenView {
-    /// Quantities, residual, what to drive next.
+    /// Quantities, residual, next manoeuvre.
     #[default]
     Overview,
     /// Every pipeline with its samples.

@@ -4,7 +4,7 @@ use dynocar_shared::{Status, UseState};
 use ratatui::style::{Color, Modifier, Style};
 use ratatui::text::Line;
 
-/// Colours where they are wanted; without them bold and faint alone.
+/// Colours where they are wanted; without them only bold and faint text.
 #[derive(Clone, Copy, Debug)]
 pub struct Palette {
     has_colour: bool,
@@ -20,7 +20,7 @@ impl Palette {
         if self.has_colour { Style::new().fg(colour) } else { Style::new() }
     }
 
-    /// As the terminal writes.
+    /// Plain text.
     pub fn plain(self) -> Style {
         Style::new()
     }

@@ -1,6 +1,6 @@
 //! The screen, cell by cell, from a state without any clock.
 //!
-//! The screens lie in `drawn`; a test that fails prints the one it has drawn.
+//! The expected screens are in `drawn`; a failing test prints the screen that it has drawn.
 
 use dynocar_shared::snapshot::packed_index;
 use dynocar_shared::vocabulary::EffectKind;

@@ -1,10 +1,9 @@
 //! The count of a train's samples: a page that its controllers and its daemon share.
 //!
-//! The controller writes the number of each sample before and after it hands it to the channel; the
-//! next controller counts on from there. So a daemon knows from which number on it could have seen
-//! samples and, when nobody drives the train any more, up to which; and a controller knows what
-//! the pipeline threads have not taken yet. Each number has one writer; the page outlives each of
-//! its users and goes with the last.
+//! The controller writes the number of each sample before and after it hands the sample to the channel; the next
+//! controller counts on from there. Thus a daemon knows the first number of which it could have seen the sample and,
+//! when nobody drives the train any more, the last; and a controller knows which samples the pipeline threads have not
+//! taken yet. Each number has one writer; the page outlives each of its users, and the last one removes it.
 
 use std::fs::OpenOptions;
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
@@ -24,7 +23,7 @@ use crate::error::ChannelError;
 use crate::host::Host;
 use crate::identity::SHARED_MEMORY;
 
-/// Pipeline threads that a page has room for; as many as can receive a train's samples.
+/// Pipeline threads that a page has room for: as many as can receive a train's samples.
 const THREADS_MAX: usize = TrainSample::RECEIVERS_MAX;
 /// Largest number that a controller can have counted up to.
 const NUMBER_MAX: u64 = u64::MAX / 2;
@@ -117,8 +116,8 @@ impl SampleCount {
         number(&self.page().published.0.begun)
     }
 
-    /// Returns the greatest number that a controller has published: who begins to receive now misses what
-    /// was published up to it, and could see what comes after it.
+    /// Returns the greatest number that a controller has published: a receiver that begins now misses the samples up to
+    /// it, and could see the samples after it.
     pub fn sent(&self) -> u64 {
         number(&self.page().published.0.sent)
     }
@@ -135,7 +134,7 @@ impl SampleCount {
         number(&self.page().served.0.pipelines) as usize
     }
 
-    /// Who published the samples up to this number is gone: what has not come of them is lost.
+    /// The publisher of the samples up to this number is gone: those that have not come are lost.
     pub fn end(&self, sequence: u64) {
         self.page().served.0.ended.store(sequence, Release);
     }

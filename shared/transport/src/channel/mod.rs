@@ -1,8 +1,8 @@
 //! The shared-memory ports: the only place that knows the transport.
 //!
-//! Publish-subscribe of iceoryx2 with safe overflow: a sender never waits, a slow receiver loses
-//! the oldest. After the death of either side nothing has to be reopened by the other. Ports
-//! are not `Send`: open them in the thread that uses them.
+//! Publish-subscribe of iceoryx2 with safe overflow: a sender never waits, a slow receiver loses the oldest messages.
+//! After the death of one side the other has to reopen nothing. Ports are not `Send`: open them in the thread that uses
+//! them.
 
 mod count;
 mod ports;

@@ -1,5 +1,5 @@
-//! Sending and receiving ends, the transport's ports behind trait objects; written for each payload, so that they
-//! are compiled in this crate.
+//! Sending and receiving ends: the transport's ports behind trait objects. They are instantiated here for each payload,
+//! so that the generic code is compiled in this crate.
 
 use std::fmt::Debug;
 use std::sync::Arc;

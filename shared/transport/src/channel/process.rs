@@ -1,8 +1,8 @@
 //! The process that owns an end: a child made by `fork()` has a copy of its parent's memory, not its ends.
 //!
-//! A page that the kernel wipes in a child marks the process, so that an end knows it without a system
-//! call. In a child an end is neither used nor dropped: dropping it would take the parent's away. The
-//! files whose locks stand for a living process are closed there, or the child would hold them on.
+//! A page that the kernel wipes in a child marks the process, so that an end can recognise the process without a system
+//! call. In a child an end is neither used nor dropped: dropping it would remove the parent's end. A child closes the
+//! files whose locks stand for a living process, or it would keep them locked.
 
 use std::fs::File;
 use std::mem::ManuallyDrop;
@@ -18,9 +18,9 @@ use crate::host::monotonic_now_ns;
 
 const PAGE_BYTES: usize = 4096;
 
-/// No process's mark.
+/// The mark before any process has made one.
 static NONE: AtomicU64 = AtomicU64::new(0);
-/// Where the word is that marks this process, zero in a child that has opened nothing.
+/// Address of the word that marks this process; the word is zero in a child that has opened nothing.
 static MARK: AtomicPtr<AtomicU64> = AtomicPtr::new((&raw const NONE).cast_mut());
 static MARK_IS_MADE: Once = Once::new();
 
@@ -29,8 +29,8 @@ fn mark() -> &'static AtomicU64 {
     unsafe { &*MARK.load(Relaxed) }
 }
 
-/// Locked files that a child closes, -1 where there is none. What finds no place stays locked until the
-/// child has ended, too.
+/// Locked files that a child closes; -1 for a free place. A file that finds no place stays locked until the child has
+/// ended, too.
 static LOCKED: [AtomicI32; 1024] = [const { AtomicI32::new(-1) }; 1024];
 
 fn make_mark() {

@@ -1,7 +1,7 @@
 //! Entering the transport, the services of its channels, and its ports behind trait objects.
 //!
-//! The transport's generic code, some thousand functions, is so compiled in this crate once, and not in every crate
-//! that opens or drops a port.
+//! This way the transport's generic code, some thousand functions, is compiled once, in this crate, and not in every
+//! crate that opens or drops a port.
 
 use std::fmt::Debug;
 use std::sync::Arc;
@@ -20,7 +20,7 @@ use super::wire::{Payload, Wire};
 use crate::channel::process::Owned;
 use crate::error::ChannelError;
 
-/// How long a service that is being made or destroyed by another process is waited for.
+/// Longest wait for a service that another process is making or destroying.
 const SETTLING_TIME: Duration = Duration::from_millis(800);
 
 /// This thread's place in the transport.
@@ -123,7 +123,7 @@ fn service_name<T: Payload>(train: TrainId) -> String {
     name
 }
 
-/// Returns true for what passes by itself while another process makes or removes the service.
+/// Returns true for an error that passes by itself while another process makes or removes the service.
 fn is_settling(error: &PublishSubscribeOpenOrCreateError) -> bool {
     use PublishSubscribeOpenOrCreateError as Error;
     match error {
@@ -145,7 +145,7 @@ fn is_settling(error: &PublishSubscribeOpenOrCreateError) -> bool {
     }
 }
 
-/// Returns the transport's refusal with what a user can do about it, where we know it.
+/// Returns the transport's refusal with the remedy for the user, where we know one.
 fn explain(error: &PublishSubscribeOpenOrCreateError) -> String {
     use PublishSubscribeOpenError as Open;
     use PublishSubscribeOpenOrCreateError as Error;

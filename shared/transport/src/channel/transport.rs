@@ -23,7 +23,7 @@ pub struct Transport {
 impl Transport {
     /// Enters the transport under a name for diagnosis.
     ///
-    /// Leaves the process's signal handlers alone, and clears away what dead processes left.
+    /// Leaves the process's signal handlers alone, and removes the files of dead processes.
     ///
     /// # Errors
     ///

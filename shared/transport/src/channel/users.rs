@@ -1,11 +1,11 @@
-//! The users of the transport of a run-time directory, to tidy up after the last of them.
+//! The users of the transport of a run-time directory, counted so that the last one can tidy up.
 //!
-//! The transport keeps one small segment for each run-time directory for good (it numbers the
-//! nodes), open to every user of the host. Here it is closed to others, and removed by the last
-//! process that leaves. Every port holds a shared lock on the root directory, which also keeps
-//! systemd-tmpfiles out of it; who can have an exclusive one is alone, and nobody can come in until
-//! the lock is let go. What processes left that were killed is removed by whoever comes in alone;
-//! while others are there, what was left half made is, by whoever makes the next service.
+//! The transport keeps one small segment for each run-time directory for good (it numbers the nodes), open to every
+//! user of the host. Here the segment is closed to others, and removed by the last process that leaves. Every port
+//! holds a shared lock on the root directory, which also keeps systemd-tmpfiles out of it. A process that gets an
+//! exclusive lock is alone, and no other can enter until it releases the lock. A process that enters alone removes the
+//! files of processes that were killed; while others are there, the next process that makes a service removes
+//! incomplete services.
 
 use std::fs::{OpenOptions, Permissions, TryLockError};
 use std::os::unix::fs::PermissionsExt;
@@ -22,9 +22,9 @@ use crate::error::ChannelError;
 use crate::host::{Host, open_private, unusable};
 use crate::identity::SHARED_MEMORY;
 
-/// How the segment's name ends.
+/// Ending of the segment's name.
 const SUFFIX: &str = ".global_mgmt";
-/// How the names of the pages end that count samples, see [`super::SampleCount`].
+/// Ending of the names of the pages that count samples, see [`super::SampleCount`].
 pub const COUNT_SUFFIX: &str = ".count";
 /// The modes of a service's description and of a segment that are not complete: the transport's.
 const DESCRIPTION_IN_MAKING: u32 = 0o600;
@@ -66,8 +66,8 @@ impl Users {
         Ok(users)
     }
 
-    /// Makes services and nodes one process at a time, after what a killed one left half made is gone;
-    /// until the file is dropped.
+    /// Begins the making of services and nodes, one process at a time, after removing those that a killed process left
+    /// incomplete; ends when the file is dropped.
     ///
     /// # Errors
     ///
@@ -80,7 +80,7 @@ impl Users {
         Ok(file)
     }
 
-    /// Removes what dead processes left, where nobody lives; the count of samples goes on.
+    /// Removes the files of dead processes, where no process lives; the count of samples stays.
     fn remove_all(&self) {
         for segment in self.segments("") {
             if segment.to_string_lossy().ends_with(COUNT_SUFFIX) {
@@ -130,8 +130,9 @@ impl Users {
         }
     }
 
-    /// Refuses to go on when shared memory cannot be written, or there is plainly too little of it. The transport makes its segments
-    /// without reserving them, and whoever touches a page that is not to be had dies of SIGBUS.
+    /// Refuses to go on when shared memory cannot be written, or there is plainly too little of it. The transport makes
+    /// its segments without reserving their memory, and a process that touches a page for which there is none dies of
+    /// SIGBUS.
     ///
     /// # Errors
     ///

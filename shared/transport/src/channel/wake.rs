@@ -1,11 +1,10 @@
 //! Waking a pipeline thread that sleeps, and paying for it only then.
 //!
-//! The thread says on the sleepers channel that it is about to sleep, looks once more for
-//! samples, and waits on its listener. The controller sends a sample, then looks at the
-//! sleepers channel, and notifies only who sleeps. A full fence on both sides between the
-//! writing and the looking makes sure that at least one of the two sees the other. A controller
-//! that has just come knows of nobody yet and wakes everyone for a while. Should a notification
-//! be lost all the same, the wait ends by its timeout.
+//! The thread announces on the sleepers channel that it is about to sleep, checks once more for samples, and waits on
+//! its listener. The controller sends a sample, then reads the sleepers channel, and notifies only threads that sleep.
+//! A full fence on both sides between writing and reading makes sure that at least one of the two sees the other. A
+//! controller that has just started knows of no thread yet and wakes every thread for a while. Should a notification be
+//! lost all the same, the wait ends by its timeout.
 
 use std::sync::atomic::{Ordering, fence};
 use std::time::Duration;
@@ -22,10 +21,10 @@ use super::{Receiver, Sender, Transport};
 use crate::error::ChannelError;
 use crate::host::monotonic_now_ns;
 
-/// Pipeline threads that one controller keeps account of.
+/// Pipeline threads that one controller can keep track of.
 const SLEEPERS_MAX: usize = 32;
-/// A new controller wakes threads it has not heard of for this long, in ns; each thread speaks up
-/// more often than that.
+/// Time in ns for which a new controller wakes threads that have not announced themselves yet; each thread announces
+/// itself more often than that.
 const NEWCOMER_NS: i64 = 500_000_000;
 const LISTENERS_MAX: usize = 64;
 const NOTIFIERS_MAX: usize = 256;

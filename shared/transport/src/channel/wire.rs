@@ -1,4 +1,4 @@
-//! The types that cross the shared memory, as the transport wants them.
+//! The types that cross the shared memory, in the form that the transport requires.
 
 use std::fmt::Debug;
 

@@ -1,5 +1,5 @@
-//! Bootstrap particle filter and marginal particle smoother (Doucet, Godsill, Andrieu 2000;
-//! Xie 2019, eq. 24-27; Jin 2020, eq. 22-25).
+//! Bootstrap particle filter and marginal particle smoother (Doucet, Godsill, Andrieu 2000; Xie 2019, eq. 24-27; Jin
+//! 2020, eq. 22-25).
 
 use std::f64::consts::LOG2_E;
 use std::ops::Range;
@@ -25,8 +25,8 @@ pub trait ParticleModel<const D: usize> {
     /// Draws the process noise of the move that starts at `step`.
     fn draw_noise(&self, step: usize) -> impl Fn(&mut Random) -> [f64; D];
 
-    /// Transition densities, up to a common factor, from every advanced state (row) to every
-    /// successor (column); states come as one slice for each component.
+    /// Writes the transition densities, up to a common factor, from every advanced state (row) to every successor
+    /// (column); states come as one slice for each component.
     fn transition_densities(
         &self,
         step: usize,

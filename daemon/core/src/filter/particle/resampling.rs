@@ -2,13 +2,13 @@
 
 use crate::filter::lanes;
 
-/// Finds the particle that each place is drawn from: place p from the first whose cumulated
-/// weight exceeds the level p + `offset`, all weights together being as many as there are
-/// particles. `offset` lies in 0 to 1; `ancestors` holds one place more than there are weights,
-/// the last without meaning.
+/// Finds the ancestor of each place, the particle that it is drawn from: the ancestor of place p is the first particle
+/// whose cumulated weight exceeds the level p + `offset`, where all weights together are scaled to the number of
+/// particles. `offset` lies in 0 to 1; `ancestors` holds one place more than there are weights, the last without
+/// meaning.
 ///
-/// Each particle marks the place from which on later ones are drawn; the highest mark up to a
-/// place is its ancestor. A search for it would take a branch that no processor can foresee.
+/// Each particle marks the place from which on later particles are drawn; the highest mark up to a place is its
+/// ancestor. A search for the ancestor would take a branch that no processor can foresee.
 ///
 /// # Real-time
 ///

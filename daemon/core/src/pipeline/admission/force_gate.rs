@@ -1,13 +1,12 @@
-//! Keeps forces that stand alone, and samples that only repeat, out of the estimators.
+//! Keeps lone forces, and samples that only repeat, out of the estimators.
 //!
-//! A force that is wrong by a plausible amount passes every check of a single sample. What gives
-//! it away is time: a train's force, once it has left its level, stays away for a while, since
-//! actuators are slow; a reading that fails comes back at once. A sample whose force has left the
-//! level of the last one taken is therefore held back until the next ones agree with it, and
-//! dropped when they return. Nothing is lost of a true change: what was held is released in order,
-//! unless the samples are so far apart that it took longer than is bridged; motion then begins anew.
-//! Where too many readings stand alone, some of them agree by chance, and nothing is taken until
-//! the forces are steady again.
+//! A force that is wrong by a plausible amount passes every check of a single sample. Time reveals the error: a train's
+//! force, once it has left its level, stays away for a while, since actuators are slow; a failed reading comes back at
+//! once. A sample whose force has left the level of the last sample taken is therefore held back until the next samples
+//! agree with it, and dropped when they return to the old level. A true change loses no samples: the held ones are
+//! released in order, unless the samples are so far apart that the wait was longer than the time that is bridged;
+//! motion then begins anew. Where too many readings are lone, some of them agree by chance, and no sample is taken
+//! until the forces are steady again.
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_shared::RejectionReason;
@@ -19,11 +18,11 @@ use crate::pipeline::motion::MOVING_MPS;
 const AGREEING: usize = 3;
 /// A change in N/kN that counts as no change: gradients change by as much within a sample.
 const TOLERANCE_N_PER_KN: f64 = 1.0;
-/// A change that counts as none, as a share of the force: sensors of force are good to a few %.
+/// A change that counts as no change, as a share of the force: force sensors are accurate to a few %.
 const TOLERANCE_SHARE: f64 = 0.08;
-/// A change of speed in m/s that the noise of a speed sensor may make.
+/// A change of speed in m/s that the noise of a speed sensor may cause.
 const TOLERANCE_MPS: f64 = 0.5;
-/// The most in m/s² that a train accelerates or brakes by.
+/// The greatest acceleration or deceleration of a train in m/s².
 const ACCELERATION_MAX_MPS2: f64 = 2.0;
 /// The quantile of the changes between samples that measures the noise of the forces. It is low, so
 /// that neither ramps nor failures of half of all samples reach it.
@@ -32,7 +31,7 @@ const NOISE_QUANTILE: f64 = 0.2;
 const CHANGE_MIN: f64 = TOLERANCE_N_PER_KN / LONE_FORCE.high;
 /// Logarithmic step of the quantile at each sample.
 const NOISE_STEP: f64 = 0.1;
-/// Changes that a new gate waits for before it says what is noise, and what fails.
+/// Changes that a new gate waits for before it judges which changes are noise and which are failures.
 const FIRST_CHANGES: usize = 20;
 /// Place of the quantile among the bends of the first changes.
 const FIRST_QUANTILE: usize = 4;
@@ -115,7 +114,7 @@ impl ForceGate {
     /// Bounded work, no allocation.
     pub fn judge(&mut self, sample: &ResolvedSample) -> GateVerdict {
         let Some(now) = Reading::from_sample(sample) else {
-            // The estimator says what is wrong with it.
+            // The estimator reports the fault of such a sample.
             self.forget();
             return GateVerdict::Take;
         };
@@ -166,7 +165,7 @@ impl ForceGate {
         }
         let newest = self.newest;
         self.forget();
-        // The content stays known, so that what repeats it further is refused as well.
+        // The content stays known, so that further repetitions of it are refused as well.
         (self.level, self.newest) = (newest, newest);
         self.skipped_s = f64::INFINITY;
         GateVerdict::Refuse(RejectionReason::Frozen)

@@ -71,8 +71,8 @@ limits! {
     REPEATED = Refused(RejectionReason::Frozen), "time of repetition in s", 0.0 to 2.5, 0.0;
     /// Innovation of an estimator; the fifth in a row beyond it is believed.
     INNOVATION = Refused(RejectionReason::Outlier), "innovation in standard deviations", -8.0 to 8.0, 2.6e-14;
-    /// Change of force from one sample to the next, over the change that 20 % of them stay below: what goes beyond it
-    /// and comes back at once stands alone.
+    /// Change of force from one sample to the next, over the change that 20 % of them stay below: a force that exceeds
+    /// it and comes back at once is lone.
     LONE_FORCE = Refused(RejectionReason::Outlier), "change of force over its 20 % quantile", -24.0 to 24.0, 1.9e-8;
     /// Share of samples that validation refuses: where this many are plainly wrong, others are wrong without being
     /// plainly so.

@@ -1,11 +1,12 @@
-//! Admission of samples: the one judge of incoming samples, and the one writer of a status.
+//! Admission of samples: the only place that judges incoming samples, and the only one that writes a status.
 //!
-//! A sample is *refused* by validation (it cannot be true), by the force gate (its force stands alone, or it only
-//! repeats) or by the estimator (it lacks a force, slides, does not fit). The input is *doubted* while units, signs or
-//! exchanged forces make the samples impossible together, or too many of them are refused. [`limits`] has the bounds.
+//! A sample is *refused* by validation (it cannot be true), by the force gate (its force is lone, or it only repeats)
+//! or by the estimator (it lacks a force, its wheels slide, or it does not fit). The input is *doubted* while wrong
+//! units, reversed signs or exchanged forces make the samples impossible together, or too many of them are refused.
+//! [`limits`] has the bounds.
 //!
 //! - `validation`: a sample by itself and after the ones before it
-//! - `force_gate`: forces that stand alone, for the estimators that step from sample to sample
+//! - `force_gate`: lone forces, for the estimators that step from sample to sample
 //! - [`crate::plausibility`]: units, signs and exchanged forces over many samples
 
 mod force_gate;
@@ -75,7 +76,7 @@ impl Admission {
         self.validator.count_from(sequence);
     }
 
-    /// Counts as lost what has not come up to this number.
+    /// Counts as lost the samples up to this number that have not come.
     pub fn count_up_to(&mut self, sequence: u64) {
         self.validator.count_up_to(sequence);
     }
@@ -104,7 +105,7 @@ impl Admission {
 
     /// Validates a sample, resolves its forces, judges the input with it and hands it to an estimator.
     ///
-    /// Samples that were refused for a value out of range count in the judgement: the range may be what is missed.
+    /// Samples refused for a value out of range take part in the judgement: the range itself may be the fault.
     ///
     /// # Real-time
     ///
@@ -219,7 +220,7 @@ impl Admission {
         (!is_doubted).then_some(judgement.known)
     }
 
-    /// Returns the recent impossibility of the samples that spoils what a kind of pipeline estimates.
+    /// Returns the recent input fault that spoils the estimates of a kind of pipeline.
     pub fn implausible(&self, kind: PipelineKind) -> Option<DetectedFault> {
         self.detected.iter().find(|detected| detected.fault.concerns(kind)).copied()
     }

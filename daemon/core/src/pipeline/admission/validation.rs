@@ -1,9 +1,9 @@
 //! Validation of samples, with a reason for each refusal.
 //!
-//! A [`Validator`] sees every sample of one train in the order of arrival. It refuses what
-//! cannot be true and counts what never came; it never repairs a value. Where the train has
-//! plainly been moved or the clock set (several samples in a row agree with each other but not
-//! with the past), it starts a new motion segment instead of refusing for ever.
+//! A [`Validator`] sees every sample of one train in the order of arrival. It refuses samples that cannot be true and
+//! counts those that never came; it never repairs a value. Where the train has plainly been moved or the clock set
+//! (several samples in a row agree with each other but not with the past), it starts a new motion segment instead of
+//! refusing for ever.
 
 use dynocar_model::force::ValidSample;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
@@ -16,16 +16,16 @@ use super::limits::{
 /// After this many refusals in a row that agree with each other, the past is given up.
 const REFUSALS_BEFORE_RESTART: u32 = 5;
 
-/// The newest gap of the sequence numbers, which may yet turn out not to be a gap.
+/// The newest gap in the sequence numbers, which may turn out not to be a gap.
 #[derive(Clone, Copy, Debug)]
 struct Gap {
-    /// The last number before it.
+    /// The last number before the gap.
     before: u64,
-    /// Samples lost before it.
+    /// Samples lost before the gap.
     lost_before: u64,
-    /// The newest number among refused samples that go on from before it.
+    /// The newest number among the refused samples that continue the numbers before the gap.
     newest: u64,
-    /// How many of those there were in a row.
+    /// Number of such samples in a row.
     refused: u32,
 }
 

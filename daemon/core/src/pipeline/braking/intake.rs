@@ -7,18 +7,18 @@ use dynocar_shared::{Reason, RejectionReason};
 use super::engine::{BrakingObservation, BrakingSettings};
 use super::motion::StepInputs;
 
-/// The coefficient that is looked for.
+/// The coefficient to be estimated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BrakingCoefficient {
     /// Adhesion: brake force over weight.
     Adhesion,
-    /// Disc friction, the declared braking ratio held.
+    /// Disc friction, with the braking ratio held as declared.
     Friction,
-    /// Braking ratio, the declared friction held.
+    /// Braking ratio, with the friction held as declared.
     Ratio,
 }
 
-/// Traction per weight below which nothing pulls: a lagging actuator never quite lets go.
+/// Traction per weight below which nothing pulls: a lagging actuator never releases completely.
 const PULLING_MIN_PER_WEIGHT: f64 = 1e-4;
 
 /// Outcome of a sample.

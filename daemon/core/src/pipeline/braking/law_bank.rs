@@ -1,9 +1,9 @@
-//! Several known laws at once, each scaled, weighed by evidence.
+//! Several known laws at once, each with a scale of its own and weighted by evidence.
 //!
-//! An interacting multiple-model filter (Blom and Bar-Shalom 1988). Every hypothesis is a law
-//! with its own scale; one of them may be that the brake, not the rail, is the smaller one
-//! ([`BrakingLaw::Demand`]). A change of hypothesis keeps distance and speed and opens the scale anew,
-//! since the rail behind the tunnel portal says nothing of the rail inside.
+//! An interacting multiple-model filter (Blom and Bar-Shalom 1988). Every hypothesis is a law with its own scale; one
+//! hypothesis may be that the brake, not the rail, limits the force ([`BrakingLaw::Demand`]). A change of hypothesis
+//! keeps distance and speed but starts the scale anew, since the rail behind a tunnel portal says nothing of the rail
+//! inside.
 
 use dynocar_shared::Uncertain;
 use nalgebra::Vector1;
@@ -15,8 +15,8 @@ use super::tracker::{TrackerModel, measure};
 use crate::filter::Gaussian;
 use crate::filter::bank::{Bank, Mixture};
 
-/// Share of the probability at which one law stands alone; else the laws are mixed, and their
-/// spread is part of the error.
+/// Share of the probability at which one law is reported alone; below it the laws are mixed, and their spread is part
+/// of the error.
 const CLEAR: f64 = 0.9;
 
 /// Number of laws: a dry rail, a wet one, and the brake itself.
@@ -27,7 +27,7 @@ pub const LAWS: usize = 3;
 struct Hypothesis {
     model: TrackerModel,
     state: Gaussian<STATES>,
-    /// Mixture by the possible changes of hypothesis: scratch of a step.
+    /// Mixture by the possible changes of hypothesis: scratch memory of a step.
     mixed: Gaussian<STATES>,
     normalised: f64,
 }
@@ -54,8 +54,8 @@ impl LawBank {
         LawBank { laws, shares, change_rate_per_s, demand: 0.0, is_started: false }
     }
 
-    /// Mixes the beliefs as the possible changes of hypothesis ask, into `mixed`; gives what
-    /// each hypothesis weighs before its likelihood, in nats.
+    /// Mixes the beliefs by the possible changes of hypothesis, into `mixed`; gives the logarithm of each hypothesis's
+    /// weight before its likelihood.
     fn mix(&mut self, step_s: f64) -> [f64; LAWS] {
         let mut weights = [0.0; LAWS];
         // Probability of a change within the step to one certain other law.

@@ -5,10 +5,9 @@
 //! s' = s + T (v + v') / 2
 //! ```
 //!
-//! Xie 2019, eq. (2)-(3), and Jin 2020, eq. (1), with the position corrected: the printed
-//! increment T (v_{t-1} - v_t) / 7.2 telescopes to nothing. The deceleration is the achieved
-//! one, without the papers' cap min(F(mu), B): above the cap the motion no longer depends on
-//! the coefficient, and an estimate that starts there never moves.
+//! Xie 2019, eq. (2)-(3), and Jin 2020, eq. (1), with the position corrected: the printed increment T (v_{t-1} - v_t) /
+//! 7.2 telescopes to nothing. The deceleration is the achieved one, without the papers' cap min(F(mu), B): above the
+//! cap the motion no longer depends on the coefficient, and an estimate that starts above it never moves.
 
 use nalgebra::{SMatrix, SVector};
 

@@ -14,8 +14,8 @@ use crate::pipeline::Estimator;
 use crate::pipeline::settings::SettingError;
 use crate::{check_setting, settings};
 
-/// Which factor of the brake force a brake pipeline reports; the other is held as declared, since
-/// only their product acts on the train.
+/// The factor of the brake force that a brake pipeline reports; the other factor is held as declared, since only their
+/// product acts on the train.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BrakeFactor {
@@ -27,7 +27,7 @@ pub enum BrakeFactor {
 }
 
 impl BrakeFactor {
-    /// Returns the coefficient that it is.
+    /// Returns the coefficient of this factor.
     pub fn quantity(self) -> BrakingCoefficient {
         match self {
             BrakeFactor::Friction => BrakingCoefficient::Friction,
@@ -58,10 +58,10 @@ settings! {
         /// The coefficient before the first observation; the declared one, or an adhesion of 0.1, when
         /// absent.
         initial: Option<f64> = None => (0 or more);
-        /// Its standard deviation over the declared value (over 0.1 for adhesion).
+        /// Standard deviation of `initial` over the declared value (over 0.1 for adhesion).
         initial_relative_std: f64 = 1.0 => (above 0);
-        /// Standard deviation that it gains in 1 s, over the demand; when absent, what serves best in
-        /// the papers' scenarios.
+        /// Standard deviation that the coefficient gains in 1 s, over the demand; when absent, the value that serves
+        /// best in the papers' scenarios.
         relative_walk: Option<f64> = None => (above 0);
         /// Factor that a brake pipeline reports; no meaning for adhesion.
         reports: BrakeFactor = BrakeFactor::Friction;
@@ -162,8 +162,8 @@ settings! {
         braking: BrakingSettings = BrakingSettings::default();
         /// The estimate lies this many seconds back; 0 for the present.
         lag_s: f64 = 5.0 => (0 to 60);
-        /// How the achieved share of the declared brake force wanders; see [`WalkSettings`] and
-        /// `SmootherSettings::walk` for what holds when absent.
+        /// How the achieved share of the declared brake force wanders; see [`WalkSettings`], and
+        /// `SmootherSettings::walk` for the walk that holds when this one is absent.
         walk: Option<WalkSettings> = None;
         /// Factor that a brake pipeline reports; no meaning for adhesion.
         reports: BrakeFactor = BrakeFactor::Friction;

@@ -4,24 +4,23 @@ use dynocar_shared::Reason;
 
 /// Mean square of normalised innovations above which they are too large.
 const MEAN_SQUARE_MAX: f64 = 2.0;
-/// Lag-1 covariance of the normalised innovations above which the model lacks something; where
-/// they are far smaller than expected, as with a perfect sensor, it does not matter that they
-/// are alike.
+/// Lag-1 covariance of the normalised innovations above which the model lacks something. Where the innovations are far
+/// smaller than expected, as with a perfect sensor, their likeness does not matter.
 const COVARIANCE_MAX: f64 = 0.4;
-/// Long-run variance of the innovations beyond which the intervals are too narrow, however small
-/// each of them is: noise that was learned from bad speeds hides the size, not the likeness.
+/// Long-run variance of the innovations beyond which the intervals are too narrow, however small each innovation is:
+/// noise that was learned from bad speeds hides their size, not their likeness.
 pub const LONG_RUN_MAX: f64 = 4.0;
-/// Standard deviations by which a statistic must leave what white innovations make of it.
+/// Standard deviations by which a statistic must differ from its mean for white innovations.
 const CHANCE_DEVIATIONS: f64 = 4.0;
 
-/// Returns whether a mean square says that innovations are larger than the covariance has it.
+/// Returns whether a mean square says that innovations are larger than the covariance predicts.
 pub fn are_too_large(mean_square: f64) -> bool {
     mean_square > MEAN_SQUARE_MAX
 }
 
-/// Returns whether mean square and lag-1 correlation say that innovations follow each other: by their
-/// covariance, or by the variance of their sums over that of as many white ones of the expected
-/// size, if the correlation fades from lag to lag as it does over the first.
+/// Returns whether mean square and lag-1 correlation say that successive innovations are alike: by their covariance, or
+/// by the variance of their sums over that of as many white innovations of the expected size, if the correlation fades
+/// from lag to lag as it does over the first.
 pub fn are_alike(mean_square: f64, correlation: f64) -> bool {
     correlation * mean_square > COVARIANCE_MAX
         || long_run_variance(mean_square, correlation) > LONG_RUN_MAX

@@ -1,9 +1,9 @@
 //! The one judge of an estimate's use, for every estimator.
 //!
-//! - [`InnovationMonitor`]: whether the innovations are as large and as white as the covariance says
-//! - [`LackOfFit`]: whether a force that no parameter explains stays
-//! - [`StatusInputs`]: all that is known of an estimate, and the verdict on it
-//! - [`InputState`], [`Judgement`]: the state of its input for an estimator, and its answer
+//! - [`InnovationMonitor`]: whether the innovations are as large and as white as the covariance predicts
+//! - [`LackOfFit`]: whether a force that no parameter explains lasts
+//! - [`StatusInputs`]: everything known of an estimate, and the verdict on it
+//! - [`InputState`], [`Judgement`]: the state of an estimator's input, and the estimator's answer
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_shared::{Reason, Status};
@@ -14,7 +14,7 @@ pub use innovations::{
 
 mod innovations;
 
-/// All that is known of an estimate when it is judged.
+/// Everything known of an estimate when it is judged.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StatusInputs {
     /// Fault that takes precedence over any judgement, such as a numerical failure.
@@ -25,7 +25,7 @@ pub struct StatusInputs {
     pub is_ready: bool,
     /// True when the intervals are narrow enough.
     pub is_known: bool,
-    /// The status while one of these is lacking.
+    /// The status while samples or precision are lacking.
     pub lacking: Status,
     /// Contradiction of a known estimate.
     pub contradiction: Option<Reason>,
@@ -100,7 +100,7 @@ const SHARE_MIN: f64 = 0.1;
 /// Share of the looks with such a force that the model cannot be said to fit with.
 const LASTING_MIN: f64 = 0.1;
 
-/// A watch on what a slow bias has to take up because no parameter of the model can.
+/// A watch on the force that a slow bias takes up because no parameter of the model can.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LackOfFit {
     looks: f64,

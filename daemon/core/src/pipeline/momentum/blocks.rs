@@ -1,10 +1,10 @@
-//! Regression data from measured forces: means of short blocks, joined by the impulse between.
+//! Regression data from measured forces: means of short blocks, and the impulse from one block to the next.
 //!
 //! A row compares the change of the mean momentum from one block to the next with the impulse of
 //! the known forces. All speeds of a block are used, so that white noise averages out, and the
-//! regressors are integrals of powers of the speed, not powers of its mean. Neighbouring rows
-//! share the mean of a block (their errors correlate by -1/2); the whitener that follows knows
-//! it, so that nothing is lost by short blocks.
+//! regressors are integrals of powers of the speed, not powers of its mean. Neighbouring rows share the mean of a block
+//! (their errors correlate by -1/2); the whitener that follows accounts for this, so that short blocks lose no
+//! information.
 
 use dynocar_model::train::Davis;
 use dynocar_shared::RejectionReason;
@@ -23,11 +23,11 @@ const COUNT_MIN: f64 = 3.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Block {
     first: UnitSample,
-    /// Time since the mean of the block before, at the first sample.
+    /// Time in s from the mean of the block before to the first sample.
     start_s: f64,
     speed_sum: f64,
     integral_sum: MomentumColumns,
-    /// The speed less what the forces explain, over time: its scatter is noise.
+    /// The speed less the part that the forces explain, over time: its scatter is noise.
     rest: FittedLine,
     edge_variance: f64,
     speed_min_mps: f64,
@@ -196,7 +196,7 @@ impl Block {
         self.speed_max_mps = self.speed_max_mps.max(now.speed_mps);
     }
 
-    /// Returns the variance of the impulse by what is not known of when and where the forces acted.
+    /// Returns the variance of the impulse because the moments and places at which the forces acted are uncertain.
     fn impulse_variance(&self, last: &UnitSample, settings: &DataSettings) -> f64 {
         let speed_mps = (self.speed_sum / self.rest.count()).max(settings.speed_min_mps);
         let place = settings.position_std_m / speed_mps * (last.known - self.first.known);

@@ -1,14 +1,13 @@
 //! Momentum against the impulse of the forces: the data of every estimator of resistance.
 //!
-//! In momentum per weight, with s = 1000 (1 + gamma) / g, the declared model reads
-//! `s dv/dt = f(t) - w0(v)`, f being the driving force in N per kN of weight (Liu 2018, eq. 5,
-//! whose printed factor 100 lacks rotating mass and rounds 1000/g). It is linear in Davis a, b
-//! and c whatever window it is integrated over.
+//! In momentum per weight, with s = 1000 (1 + gamma) / g, the declared model reads `s dv/dt = f(t) - w0(v)`, where f is
+//! the driving force in N per kN of weight (Liu 2018, eq. 5, whose printed factor 100 lacks rotating mass and rounds
+//! 1000/g). It is linear in Davis a, b and c for any window of integration.
 //!
-//! - [`UnitSample`], [`SpeedWatch`]: forces per weight; spikes refused, noise of the speed learned
+//! - [`UnitSample`], [`SpeedWatch`]: forces per weight; refusal of spikes of the speed, and its noise, learned
 //! - [`blocks`]: samples to blocks, the impulse between them, and the share of each unknown in it
 //! - [`Disturbance`]: the correlation of blocks by a small unknown force
-//! - [`DataSettings`]: how samples become such data
+//! - [`DataSettings`]: how samples become regression data
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::Davis;
@@ -25,16 +24,16 @@ pub mod blocks;
 
 /// Davis a, b, c.
 pub const PARAMETERS: usize = 3;
-/// All that a row depends on: Davis a, b, c, then what is not exactly known of the forces, in
-/// this order: the scale of traction, the scale of the brake, the delay in s of both.
+/// Number of unknowns of a row: Davis a, b, c, then the errors of the forces, in this order: the scale of traction, the
+/// scale of the brake, the delay in s of both.
 pub const UNKNOWNS: usize = 6;
 /// Index of the error of the traction force's scale among the unknowns.
 pub const TRACTION_SCALE: usize = 3;
 /// Index of the error of the brake force's scale among the unknowns.
 pub const BRAKE_SCALE: usize = 4;
-/// Index of the delay in s of a force behind its report among the unknowns.
+/// Index of the delay in s between the report of a force and the force itself among the unknowns.
 pub const FORCE_DELAY: usize = 5;
-/// Columns of a row: the known part, then what each unknown takes off it.
+/// Columns of a row: the known part, then the amount that one unit of each unknown subtracts from it.
 pub const COLUMNS: usize = 1 + UNKNOWNS;
 /// Regressors are 1, v/20 and (v/20)²: of one magnitude over the speeds of trains.
 pub const SPEED_SCALE_MPS: f64 = 20.0;
@@ -67,13 +66,13 @@ pub fn gap_s(last_ns: &mut Option<i64>, time_ns: i64) -> Option<f64> {
 /// Integrals since the middle of the newest block.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SinceBlock {
-    /// The integral of the driving force, then what each unknown takes off it.
+    /// The integral of the driving force, then the amount that one unit of each unknown subtracts from it.
     pub impulse: MomentumColumns,
     /// Momentum per weight and speed.
     pub inertia: f64,
 }
 
-/// Mean momentum of a block of samples, and what should have led to it from the block before.
+/// Mean momentum of a block of samples, and the impulse that should have led to it from the block before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MomentumBlock {
     /// True when no block before it belongs to it.
@@ -82,8 +81,8 @@ pub struct MomentumBlock {
     pub momentum: f64,
     /// Variance of `momentum` by the noise of the speed.
     pub momentum_variance: f64,
-    /// From the mean of the block before to this one's: the integral of f, then what each
-    /// unknown takes off it.
+    /// From the mean of the block before to the mean of this one: the integral of f, then the amount that one unit of
+    /// each unknown subtracts from it.
     pub impulse: MomentumColumns,
     /// Variance of the integral of f.
     pub impulse_variance: f64,
@@ -93,8 +92,8 @@ pub struct MomentumBlock {
     pub speed_mps: f64,
 }
 
-/// Hidden states of the error: accumulated momentum (or what the overlap brings over), and the
-/// disturbance.
+/// Number of hidden states of the error: accumulated momentum (for coasting segments, the error that overlapping
+/// segments share), and the disturbance.
 pub const STATES: usize = 2;
 /// Index of the accumulated momentum.
 pub const MOMENTUM: usize = 0;
@@ -165,7 +164,7 @@ pub fn momentum_seen<const C: usize>(momentum: f64, variance: f64) -> Sighting<S
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DataSource {
-    /// Momentum against the impulse of the measured forces, whatever the train does.
+    /// Momentum against the impulse of the measured forces, in every kind of motion.
     #[default]
     Momentum,
     /// Half-overlapping coasting segments (Liu 2018, figure 2).

@@ -1,5 +1,5 @@
-//! Retardation of the train by one unit of each column at a sample, and its impulse by blocks; the unexplained
-//! force of earlier passes at each place of the line is one of the columns.
+//! Retardation of the train by one unit of each column at a sample, and the impulse of each column by blocks; one of
+//! the columns is the unexplained force of earlier passes at each place of the line.
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::SuspectInput;

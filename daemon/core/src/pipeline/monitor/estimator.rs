@@ -26,13 +26,14 @@ use crate::pipeline::output::{write_innovations, write_parameters};
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 
-/// Rows before anything is called estimated.
+/// Rows before any value is called estimated.
 const ROWS_MIN: f64 = 12.0;
 /// Innovations that their statistics look back over.
 const MONITOR_ROWS: u32 = 150;
-/// The same where an effect is sought that no suspect explains: what is over is soon forgotten.
+/// The same for a search of an effect that no suspect explains: an effect that has ended is soon forgotten.
 const CUT_ROWS: u32 = 60;
-/// Innovations count as no larger for an effect that no suspect explains: beyond lie outliers.
+/// Largest size at which an innovation counts in the search of an effect that no suspect explains: larger ones are
+/// outliers.
 const CUT: f64 = 3.0;
 /// Standard deviations of the wheels' diameter up to which it is usual.
 const WHEEL_STDS: f64 = 3.5;
@@ -43,7 +44,7 @@ const PERIOD_SAMPLES: f64 = 100.0;
 pub struct ResidualMonitor {
     settings: MonitorSettings,
     declared: Davis,
-    /// The declared a, b, c, scaled, as base parameters; the regression is about what they lack.
+    /// The declared a, b, c, scaled, as base parameters; the regression estimates the differences from them.
     declared_base: BaseVector,
     base_std: BaseVector,
     kept_per_row: f64,
@@ -122,7 +123,7 @@ impl ResidualMonitor {
         })
     }
 
-    /// A run starts: brakes are released, and whatever dragged is over.
+    /// A run starts: brakes are released, and a brake that dragged has ended.
     fn start_run(&mut self) {
         let dragged = self.verdict.naming.onset();
         (0..ONSETS).for_each(|place| self.retire(FIRST_ONSET + place, dragged == Some(place)));
@@ -145,7 +146,7 @@ impl ResidualMonitor {
         }
     }
 
-    /// The train has stopped and moves again: what may change at stops is open anew.
+    /// The train has stopped and moves again: effects that may change at stops are unknown anew.
     fn start_leg(&mut self) {
         self.onsets.start_leg();
         self.verdict.start_leg();
@@ -226,7 +227,7 @@ impl ResidualMonitor {
         }
     }
 
-    /// Notes what the base model leaves at this place, unless another suspect explains it.
+    /// Notes the residual force of the base model at this place, unless another suspect explains it.
     fn remember_place(
         &mut self,
         block: &MomentumBlock,

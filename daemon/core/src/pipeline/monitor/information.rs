@@ -1,11 +1,10 @@
 //! The likelihood ratio of every suspect against the base model.
 //!
-//! The rows are condensed into their information matrix. Each suspect is an alternative of its
-//! own: the base model and that one parameter, all others being 0. With the base's block
-//! factorised, `S = L_jj - w'w` and `s = h_j - w'u` (the Schur complement and its right side)
-//! give the parameter `s / (S + 1/sigma²)` and twice the log-likelihood ratio
-//! `s² / (S + 1/sigma²)`; `ln(1 + S sigma²)` is what the freedom of its size costs, so that the
-//! difference is twice the logarithm of the Bayes factor.
+//! The rows are condensed into their information matrix. Each suspect is an alternative of its own: the base model and
+//! that one parameter, all others being 0. With the base's block factorised, `S = L_jj - w'w` and `s = h_j - w'u` (the
+//! Schur complement and its right side) give the parameter `s / (S + 1/sigma²)` and twice the log-likelihood ratio `s²
+//! / (S + 1/sigma²)`; `ln(1 + S sigma²)` is the price of a free parameter, so that the difference is twice the
+//! logarithm of the Bayes factor.
 
 use dynocar_model::train::TrainModel;
 use nalgebra::{SMatrix, SVector};
@@ -37,7 +36,7 @@ pub struct MonitorInformation {
     base_precision: BaseVector,
 }
 
-/// The base model solved, and what it leaves of each suspect.
+/// The solved base model, and the information about each suspect that remains beyond it.
 #[derive(Clone, Debug)]
 pub struct BaseSolution {
     /// L, the base's factor.
@@ -102,8 +101,9 @@ impl BaseSolution {
         self.prior_variance[index].sqrt()
     }
 
-    /// Returns a parameter of the base model that may be unusual, by a standard deviation beyond the usual one: as
-    /// it then is; and twice the log-likelihood ratio of that against a usual one, and what it costs.
+    /// Returns a parameter of the base model that may be unusual, by a standard deviation beyond the usual one: its
+    /// estimate if it is unusual, and twice the log-likelihood ratio of that against a usual value, with the price of
+    /// the freedom.
     pub fn unusual(&self, index: usize, more_std: f64) -> (Alternative, (f64, f64)) {
         let (value, variance) = self.parameter(index);
         let usual = self.prior_variance[index];
@@ -162,7 +162,7 @@ impl BaseSolution {
 }
 
 impl Believed<'_> {
-    /// Returns the variance of a sum of parameters by what the rows leave open.
+    /// Returns the variance of a sum of parameters that the rows leave.
     pub fn variance_of(&self, weights: &ParameterVector) -> f64 {
         let reduced = self.base.forward(weights.fixed_rows::<BASE>(0).into_owned());
         let by_suspect = self.suspect.map_or(0.0, |(index, variance)| {
@@ -198,8 +198,8 @@ impl MonitorInformation {
         self.count = kept * self.count + 1.0;
     }
 
-    /// A parameter is another from now on, by a standard deviation: what the rows so far say of it
-    /// is integrated over the difference.
+    /// Declares that a parameter has another value from now on, with a standard deviation of the difference: the
+    /// information of the rows so far is integrated over that difference.
     pub fn loosen(&mut self, parameter: usize, std: f64) {
         let column: ParameterVector = self.matrix.column(parameter).into_owned();
         let pivot = column[parameter] + 1.0 / (std * std);
@@ -209,8 +209,8 @@ impl MonitorInformation {
         self.square_sum -= share * share * pivot;
     }
 
-    /// Frees a parameter's place for other rows: either it was 0 all along, or, with a prior
-    /// standard deviation, it was what the rows say and is integrated out.
+    /// Frees a parameter's place for other rows: either the parameter was 0 all along, or, with a prior standard
+    /// deviation, the rows estimate it and it is integrated out.
     pub fn retire(&mut self, parameter: usize, prior_std: Option<f64>) {
         if let Some(std) = prior_std {
             self.loosen(parameter, std);
@@ -269,7 +269,7 @@ impl MonitorInformation {
         Alternative::new(left, base.rest[own] - share * base.rest[taken], prior_std)
     }
 
-    /// Returns the mean square of what base model and a suspect of such a ratio leave of the rows.
+    /// Returns the mean square of the residuals of the rows under the base model and a suspect of such a ratio.
     pub fn mean_square(&self, base: &BaseSolution, ratio: f64, prior_rows: f64) -> f64 {
         let rest = (self.square_sum - base.reduced.norm_squared() - ratio).max(0.0);
         (rest + prior_rows) / (self.count + prior_rows)
@@ -279,8 +279,8 @@ impl MonitorInformation {
 /// Standard deviation of a curve constant of which nothing is declared, in 1000 N/kN m.
 const CURVE_STD_MIN: f64 = 0.02;
 
-/// Returns the base model of a train before the rows: the declared a, b, c, scaled, as base parameters, and
-/// standard deviations of what each base parameter lacks.
+/// Returns the base model of a train before the rows: the declared a, b, c, scaled, as base parameters, and the
+/// standard deviations of their errors.
 ///
 /// # Errors
 ///

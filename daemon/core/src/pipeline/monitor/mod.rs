@@ -1,21 +1,20 @@
-//! The pipeline `residual_monitor`: the force that the model does not explain, and its likely effects.
+//! The pipeline `residual_monitor`: the force that the model does not explain, and its likely causes.
 //!
-//! Momentum blocks make a linear regression in a, b, c and what is not exactly known of the
-//! forces, as in [`crate::pipeline::momentum`]. Each suspect adds one column: what one unit of
-//! it would take off the momentum. All columns go through one whitener and into one information
-//! matrix, from which the likelihood ratio of every suspect against the base model follows at
-//! any time, a, b and c being refitted together with it. The distance by position against the distance by
-//! speed adds the wheels' diameter.
+//! Momentum blocks make a linear regression in a, b, c and the errors of the forces, as in
+//! [`crate::pipeline::momentum`]. Each suspect adds one column: the momentum that one unit of it would take away. All
+//! columns go through one whitener and into one information matrix, from which the likelihood ratio of every suspect
+//! against the base model follows at any time, with a, b and c refitted together with the suspect. The distance by
+//! position against the distance by speed adds the wheels' diameter.
 //!
 //! # Layout, in the order a sample takes
 //!
-//! - `suspects`: the effects that are looked for, since when a brake may drag, and the pressure that shows it
-//! - `covariates`, `wheel_scale`: evidence of a sample on each of them
+//! - `suspects`: the effects that are looked for, the time since which a brake may drag, and the pressure that shows it
+//! - `covariates`, `wheel_scale`: evidence that a sample gives on each suspect
 //! - `rows`: blocks to independent rows of unit variance
-//! - `information`: how far off everything may be, and the likelihood ratios
-//! - `verdict`: the evidence for each of them
+//! - `information`: the uncertainty of every parameter, and the likelihood ratios
+//! - `verdict`: the evidence for each suspect
 //! - `naming`: the suspect, its alternatives, and the end of the suspicion
-//! - `estimator`: the pipeline around all of it
+//! - `estimator`: the pipeline around these parts
 
 use dynocar_model::terms::{bearings, curve, masses};
 
@@ -37,7 +36,7 @@ settings! {
     /// Settings of `residual_monitor`.
     #[derive(Copy)]
     MonitorSettings {
-        /// Evidence, less what the search costs, from which a suspect is named.
+        /// Evidence, less the price of the search, from which a suspect is named.
         evidence_min: f64 = 20.0 => (1 to 1000000);
         /// Share of the resistance below which an unexplained force is no matter.
         share_min: f64 = 0.08 => (0 to 1);
@@ -61,8 +60,8 @@ settings! {
         map_std_permille: f64 = 0.03 => (0 to 10 "permille");
         /// Standard deviation of the declared curve constant, as a share of it.
         curve_constant_std: f64 = curve::USUAL_STD => (0.001 to 1);
-        /// Standard deviation of what bearings that warm up add at the start of a run, as a share of the
-        /// basic resistance.
+        /// Standard deviation of the resistance that bearings add at the start of a run before they are warm, as a
+        /// share of the basic resistance.
         warming_std: f64 = bearings::USUAL_STD => (0.0001 to 1);
         /// Standard deviation of the wheels' diameter, as a share of it.
         wheel_std: f64 = 0.0015 => (0.0001 to 0.1);

@@ -6,25 +6,24 @@ use super::suspects::{CANDIDATES, FIRST_ONSET, Onsets, PARAMETERS, effect_of};
 use crate::pipeline::InnovationMonitor;
 use crate::pipeline::momentum::FORCE_DELAY;
 
-/// A named suspect stays until its evidence is below this share of what named it.
+/// A named suspect stays until its evidence is below this share of the evidence that named it.
 const STAYS_SHARE: f64 = 0.5;
-/// Another suspect takes over when its evidence is greater by this; below it, the two are reported as
-/// alternatives.
+/// Another suspect takes over when its evidence is greater by this; below it, both are reported as alternatives.
 const TAKES_OVER_BY: f64 = 5.0;
-/// Blocks in a row for which evidence must last.
+/// Number of successive blocks for which evidence must last.
 const LASTING_BLOCKS: u32 = 2;
-/// Twice the log-likelihood ratio of no effect against the effect as found, over the rows since
-/// it was last there, from which its cause has ended.
+/// Twice the log-likelihood ratio of no effect against the effect as found, over the rows since the effect was last
+/// present, from which its cause has ended.
 const ENDED: f64 = 16.0;
-/// Suspected brakes that let go while the train drove, from which another is doubted.
+/// Number of suspected brakes that were released while the train drove, from which another is doubted.
 const LET_GO_MAX: f64 = 1.5;
-/// Share of them that is remembered from block to block: four hours.
+/// Share of that number that is remembered from block to block: four hours.
 const LET_GO_KEPT: f64 = 1.0 - 1.0 / 2880.0;
-/// Kinds that, at a place that was never passed, look like a brake that drags.
+/// Kinds that look like a dragging brake at a location that was never passed before.
 const PLACES: u32 = EffectKind::LocalResistance.bit()
     | EffectKind::GradientError.bit()
     | EffectKind::GradientShift.bit();
-/// Blocks that a constant force must have lasted until no other law is meant.
+/// Blocks that a constant force must have lasted until other laws of the force are excluded.
 const CONSTANT_BLOCKS: u32 = 60;
 /// Innovations before their statistics are judged.
 const INNOVATIONS_MIN: f64 = 40.0;
@@ -38,7 +37,7 @@ pub struct Named {
     pub effect: EffectKind,
     /// Its candidate; `None` for an unknown effect.
     candidate: Option<usize>,
-    /// Evidence less what the search costs.
+    /// Evidence less the price of the search.
     pub evidence: f64,
     /// Bits of the effects that are hardly distinguishable from it.
     pub alternatives: u32,
@@ -64,7 +63,7 @@ pub struct CandidateEvidence<'a> {
     pub cut_innovations: &'a InnovationMonitor,
     /// Since when brakes may drag.
     pub onsets: &'a Onsets,
-    /// True where no earlier pass shows what the location does.
+    /// True where no earlier pass shows the effect of the location.
     pub is_new_place: bool,
     /// True while released brakes hold pressure.
     pub is_pressure_raised: bool,
@@ -132,8 +131,7 @@ impl Naming {
         }
     }
 
-    /// Adds what a row speaks for no effect against the effect as found (CUSUM); true when its
-    /// cause has ended.
+    /// Adds the evidence of a row for no effect against the effect as found (CUSUM); true when its cause has ended.
     pub fn has_ended(&mut self, gone: f64) -> bool {
         self.ending = (self.ending + gone).max(0.0);
         let has_ended = self.ending > ENDED;
@@ -143,7 +141,7 @@ impl Naming {
         has_ended
     }
 
-    /// Takes in what speaks for whom after a block.
+    /// Takes in the evidence for the candidates after a block.
     pub fn take(&mut self, standing: &CandidateEvidence) {
         let CandidateEvidence { net, rank, .. } = *standing;
         self.let_go *= LET_GO_KEPT;
@@ -181,8 +179,8 @@ impl Naming {
         if is_as_a_brake && standing.is_new_place {
             bits |= PLACES;
         }
-        // A force by another law is constant for a while, too; and what leaves large innovations is
-        // not all there is.
+        // A force by another law is constant for a while, too; and where large innovations remain, there is more than
+        // this effect.
         let onset = candidate.checked_sub(FIRST_ONSET).filter(|_| is_a_brake);
         let age = onset.and_then(|index| standing.onsets.age(index));
         let is_short = age.is_some_and(|age| age < CONSTANT_BLOCKS);
@@ -205,8 +203,8 @@ impl Naming {
         }
     }
 
-    /// Returns the innovations larger than small things explain, and no suspect; what earlier segments spoke for
-    /// may be behind it, or a place that was never passed.
+    /// Returns the unknown effect where innovations are larger than small errors explain and no suspect is named;
+    /// effects for which earlier segments gave evidence may be behind it, or a place that was never passed.
     fn unknown(&self, standing: &CandidateEvidence) -> Option<Named> {
         let evidence = self.unexplained(standing)?;
         let likely = bits_of(|candidate| standing.rank[candidate] > self.evidence_min);
@@ -222,8 +220,8 @@ impl Naming {
     fn unexplained(&self, standing: &CandidateEvidence) -> Option<f64> {
         let innovations = standing.cut_innovations;
         let count = innovations.effective_count();
-        // Twice the log-likelihood ratio of normal innovations of that variance against 1,
-        // in terms of what is believed at most.
+        // Twice the log-likelihood ratio of normal innovations of that variance against 1, with the greatest credible
+        // mean square as the unit.
         let excess = innovations.mean_square() / MEAN_SQUARE_MAX;
         let evidence = count * (excess - 1.0 - excess.ln());
         let is_there = count > INNOVATIONS_MIN && excess > 1.0 && evidence > self.evidence_min;
@@ -237,7 +235,7 @@ fn bits_of(is_so: impl Fn(usize) -> bool) -> u32 {
     so.fold(0, |bits, candidate| bits | effect_of(candidate).bit())
 }
 
-/// Returns the effects that are hardly distinguishable from the chosen one: by their evidence, or by what they are.
+/// Returns the effects that are hardly distinguishable from the chosen one: by their evidence, or by their kind.
 fn alternatives(chosen: usize, least: f64, standing: &CandidateEvidence) -> u32 {
     let CandidateEvidence { net, rank, .. } = *standing;
     let effect = effect_of(chosen);

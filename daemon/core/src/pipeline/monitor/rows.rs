@@ -1,4 +1,4 @@
-//! Blocks of momentum to independent rows of unit variance, with a column for each suspect.
+//! From blocks of momentum to independent rows of unit variance, with a column for each suspect.
 
 use dynocar_model::terms::wind;
 use dynocar_model::train::Davis;
@@ -120,7 +120,7 @@ impl Rows {
         self.whitener.clear_column(1 + parameter);
     }
 
-    /// Returns the disturbance now: known part, what each parameter takes off it, variance.
+    /// Returns the disturbance now: known part, the amount that one unit of each parameter subtracts from it, variance.
     pub fn disturbance(&self) -> (f64, ParameterVector, f64) {
         let state = self.whitener.state;
         let taken = ParameterVector::from_fn(|i, _| state[(DISTURBANCE, 1 + i)]);

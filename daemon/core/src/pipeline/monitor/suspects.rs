@@ -1,9 +1,9 @@
 //! The effects that the monitor looks for, and brake-cylinder pressure that stays while no brake is reported.
 //!
-//! Figures that are never known exactly are among the base model's own parameters: the forces' scales and delay,
-//! the load, the wind of the day, the curve constant, how cold bearings are. Of these an unusual value is an
-//! effect. All other suspects have a column each in addition to it; the wheels' diameter shows by positions,
-//! without any force.
+//! Figures that are never known exactly are among the base model's own parameters: the forces' scales and delay, the
+//! load, the wind of the day, the curve constant, the extra resistance of cold bearings. An unusual value of one of
+//! these is an effect. All other suspects have a column each in addition to the base model; positions show the wheels'
+//! diameter, without any force.
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::speed_band::BANDS;
@@ -12,7 +12,7 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use crate::pipeline::momentum::{FORCE_DELAY, TRACTION_SCALE, UNKNOWNS};
 
-/// Columns of the base model: a, b, c, two force scales, the delay, and what else is never exact.
+/// Columns of the base model: a, b, c, two force scales, the delay, and the other figures that are never exact.
 pub const BASE: usize = UNKNOWNS + USUAL.len();
 /// Index of the load of a run: the true over the given mass less 1.
 pub const LOAD: usize = UNKNOWNS;
@@ -36,7 +36,7 @@ pub const BANK: [Suspect; SUSPECTS] = {
     }
     bank
 };
-/// Columns that come from samples: of the base model what the regression does not hold, and the suspects.
+/// Columns that come from samples: the base model's parameters beyond the unknowns of the regression, and the suspects.
 pub const COVARIATES: usize = USUAL.len() + SUSPECTS;
 /// Index of the first band of speed among the parameters.
 pub const FIRST_BAND: usize = BASE + TERMS.len();

@@ -13,20 +13,20 @@ use super::suspects::{
 use crate::pipeline::InnovationMonitor;
 use crate::pipeline::momentum::{FORCE_DELAY, UNKNOWNS};
 
-/// Blocks that a suspect which began at some moment must have acted.
+/// Number of blocks that a suspect with a known beginning must have acted.
 const AGE_MIN: u32 = 5;
-/// Evidence of a raised pressure of released brakes for a dragging brake.
+/// Evidence for a dragging brake that the raised pressure of a released brake gives.
 const PRESSURE_EVIDENCE: f64 = 10.0;
-/// Share of the least size worth naming up to which an effect counts as none: surveys, maps and
-/// calibrations are never exact, and what is small and lasts gathers evidence without end.
+/// Share of the least size worth naming up to which an effect counts as none: surveys, maps and calibrations are never
+/// exact, and a small lasting error gathers evidence without end.
 const TOLERATED_SHARE: f64 = 0.25;
-/// Standard deviations up to which what is never known exactly is usual.
+/// Standard deviations up to which the value of a figure that is never known exactly is usual.
 const USUAL_STDS: f64 = 2.0;
 /// Share of evidence that outlasts a stop, for effects that may change there.
 const KEPT_AT_STOP: f64 = 0.7;
-/// Share of it that outlasts a block: what is still there shows again within a minute.
+/// Share of that evidence that outlasts a block: an effect that is still there shows again within a minute.
 const KEPT_PER_BLOCK: f64 = 0.9;
-/// Rows for which unit variance counts against the rows seen.
+/// Number of rows that unit variance counts for against the rows seen.
 const PRIOR_ROWS: f64 = 20.0;
 
 /// Evidence from which the verdict is formed.
@@ -36,15 +36,15 @@ pub struct ResidualEvidence<'a> {
     pub information: &'a MonitorInformation,
     /// The base model solved.
     pub base: &'a BaseSolution,
-    /// Since when a brake may drag.
+    /// Time since which a brake may drag.
     pub onsets: &'a Onsets,
     /// True while released brakes hold pressure.
     pub is_pressure_raised: bool,
-    /// True where no earlier pass shows what the location does.
+    /// True where no earlier pass shows the effect of the location.
     pub is_new_place: bool,
     /// Evidence for an unusual error of the speed's scale.
     pub wheel: f64,
-    /// Time in s between samples, which limits what can be said of a delay.
+    /// Time in s between samples, which limits the accuracy of a delay.
     pub period_s: f64,
     /// Statistics of the innovations of the model as it is believed, cut off where outliers begin.
     pub cut_innovations: &'a InnovationMonitor,
@@ -60,7 +60,7 @@ pub struct MonitorVerdict {
     resistance: ParameterVector,
     /// Evidence that outlasted stops.
     held: [f64; SUSPECTS],
-    /// Evidence of the segments between earlier stops, for what is another after each.
+    /// Evidence of the segments between earlier stops, for effects that have another value after each stop.
     gathered: [f64; SUSPECTS],
     /// Evidence of the rows in hand for each being there.
     own: [f64; CANDIDATES],
@@ -112,8 +112,8 @@ impl MonitorVerdict {
         self.leg_blocks = 0;
     }
 
-    /// A stop: what may change there loses some of its evidence for being there now, and keeps it
-    /// for being what it was.
+    /// A stop: an effect that may change there loses some of the evidence for its presence now; in the comparison with
+    /// other effects all of the evidence still counts.
     pub fn hold_over_stop(&mut self, parameter: usize) {
         let suspect = parameter - BASE;
         let own = self.own[parameter];
@@ -122,7 +122,7 @@ impl MonitorVerdict {
         self.own[parameter] = 0.0;
     }
 
-    /// Forgets a parameter: its place is taken by another, or what it stood for has ended.
+    /// Forgets a parameter: its place is taken by another, or its effect has ended.
     pub fn clear(&mut self, parameter: usize) {
         self.unit_force[parameter] = 0.0;
         self.resistance[parameter] = 0.0;

@@ -1,18 +1,17 @@
 //! The wheels' diameter against the declared one: the distance by speed over the distance by position.
 //!
-//! A position that comes from the same wheel shows nothing; fixes at balises, or GNSS, do. The
-//! difference between chainage and integrated speed is `offset - error * distance`, so that a straight
-//! line over points some distance apart gives the error of the speed's scale. Each unbroken row of
-//! points has an offset of its own.
+//! A position derived from the same wheel shows nothing; fixes at balises, or GNSS, do. The difference between chainage
+//! and integrated speed is `offset - error * distance`, so that a straight line over points some distance apart gives
+//! the error of the speed's scale. Each unbroken row of points has an offset of its own.
 
 use dynocar_model::force::ResolvedSample;
 
 /// Distance in m between points: fixes lie so far apart.
 const APART_M: f64 = 500.0;
-/// Standard deviation in m of a point: a fix, and what the odometer drifts until the next.
+/// Standard deviation in m of a point: the error of a fix, and the drift of the odometer until the next fix.
 const POINT_STD_M: f64 = 5.0;
-/// A position that is off by more in m is wrong, unless the next ones agree with it; a wheel that
-/// is 5 % off drifts less over two kilometres between balises.
+/// A position that is wrong by more than this in m is refused, unless the next ones agree with it; a wheel that is 5 %
+/// off drifts less over two kilometres between balises.
 const JUMP_M: f64 = 120.0;
 /// Samples in a row that say the position did jump.
 const JUMP_SAMPLES: u32 = 10;
@@ -114,14 +113,14 @@ impl WheelScale {
         });
     }
 
-    /// Forgets a share of what rows that ended have shown.
+    /// Forgets a share of the evidence of rows that ended.
     pub fn forget(&mut self, kept: f64) {
         self.information *= kept;
         self.product *= kept;
     }
 
-    /// Returns the speed's scale less 1, and twice the log-likelihood ratio of one beyond what is `usual`
-    /// against that, less what the freedom of its size costs.
+    /// Returns the speed's scale less 1, and twice the log-likelihood ratio of a scale beyond the `usual` error against
+    /// a usual one, less the price of the freedom.
     pub fn evidence(&self, usual: f64) -> (f64, f64) {
         let (information, product) = self.going.map_or((0.0, 0.0), |going| going.row.gathered());
         let prior = 1.0 / (PRIOR_STD * PRIOR_STD);

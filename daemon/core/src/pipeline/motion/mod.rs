@@ -1,7 +1,8 @@
 //! Motion of the train that every estimator takes from the samples.
 //!
-//! - [`STANDING_MPS`], [`MOVING_MPS`], [`BRIDGED_MAX_S`]: when a train stands, moves, and is lost sight of
-//! - [`Trust`], [`OutlierRow`]: how far a measured speed is believed
+//! - [`STANDING_MPS`], [`MOVING_MPS`], [`BRIDGED_MAX_S`]: speeds at which a train stands or moves, and the longest gap
+//!   between samples
+//! - [`Trust`], [`OutlierRow`]: how far a measured speed is trusted
 //! - [`jump_variance`], [`kink_variance`]: the error of a trapezoid over a step
 //! - [`Rounding`], [`SpeedNoise`]: the steps that a speed is reported in, and its noise
 //! - [`PositionNoise`]: the noise of a measured position

@@ -4,18 +4,18 @@ use dynocar_model::force::ResolvedSample;
 
 use super::BRIDGED_MAX_S;
 
-/// Differences that are looked back over.
+/// Number of differences in the average.
 const MEMORY: f64 = 500.0;
-/// Differences before anything is said.
+/// Number of differences before a noise is reported.
 const COUNT_MIN: f64 = 50.0;
 /// A difference counts up to this many standard deviations of the known error: a jump of the position is not noise.
 const CLIP_DEVIATIONS: f64 = 5.0;
 
 /// Variance of a position's white noise.
 ///
-/// A position moves on by the integral of the speed. What is left of a step is the noise at its end
-/// less the noise at its beginning, so that neighbouring steps share one noise with opposite signs: the
-/// product of two that follow each other has the mean `-R`, whatever slow scale or drift there is.
+/// A position moves on by the integral of the speed. The residual of a step is the noise at its end less the noise at
+/// its beginning, so that neighbouring steps share one noise with opposite signs: the product of successive residuals
+/// has the mean `-R`, regardless of a slow scale error or drift.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PositionNoise {
     last: Option<PositionPair>,

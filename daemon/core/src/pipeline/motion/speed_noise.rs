@@ -2,14 +2,14 @@
 
 /// Degrees of freedom that a guess counts for.
 const GUESS_FREEDOM: f64 = 2.0;
-/// The degrees of freedom that the variance looks back over.
+/// Number of degrees of freedom in the average of the variance.
 const MEMORY: f64 = 3000.0;
 /// A scatter counts up to this many standard deviations above the expectation of the known variance: a spike too
 /// small for the gate would else widen every interval.
 const CLIP_DEVIATIONS: f64 = 4.0;
 /// Degrees of freedom before a scatter is clipped.
 const FREEDOM_BEFORE_CLIP: f64 = 20.0;
-/// No speed is known better, in (m/s)².
+/// Least variance of a speed in (m/s)².
 const VARIANCE_MIN: f64 = 1e-6;
 
 /// Variance of a speed's white noise, and the steps that the speed is reported in.
@@ -25,7 +25,8 @@ pub struct SpeedNoise {
 }
 
 impl SpeedNoise {
-    /// Nothing is known; until the first scatter a sample is taken to have a standard deviation in m/s.
+    /// Starts without knowledge; until the first scatter the standard deviation of a sample is taken to be this, in
+    /// m/s.
     pub fn unknown(first_mps: f64) -> Self {
         let first = first_mps * first_mps;
         let rounding = Rounding::default();
@@ -54,12 +55,12 @@ impl SpeedNoise {
         self.average(clipped, freedom);
     }
 
-    /// Takes in what a filter left of a measurement: the residual in m/s, the variance of the filtered
-    /// speed, and the weight that the measurement had against a full one.
+    /// Takes in the residual that a filter leaves of a measurement, in m/s, the variance of the filtered speed, and the
+    /// weight of the measurement, 1 being a full one.
     ///
     /// After an update, the residual r and the variance P of the filtered speed obey `E(r²) + P = R`
-    /// for the variance R of the measurement. A residual counts up to where its weight begins to
-    /// fall (Huber 1964): a spike that is not left out would else widen what passes for noise.
+    /// for the variance R of the measurement. A residual counts up to where its weight begins to fall (Huber 1964): a
+    /// spike that is not left out would otherwise widen the estimated noise.
     pub fn take_residual(&mut self, residual_mps: f64, filtered_variance: f64, weight: f64) {
         let bounded_mps = weight * residual_mps;
         self.average(bounded_mps * bounded_mps + filtered_variance, 1.0);
@@ -104,9 +105,9 @@ impl SpeedNoise {
 /// Finds the quantum of a speed signal and the noise that it makes.
 ///
 /// Speeds on a grid differ by multiples of its step: the smallest difference ever seen is the step
-/// of a coarse signal, and soon all but nothing for a fine one. Without noise it is the least
-/// change from one sample to the next, which stands for what a model without any error would make
-/// of perfect speeds: no model is that good. A speed that only repeats shows nothing of its step.
+/// of a coarse signal, and soon all but nothing for a fine one. Without noise the quantum is the least change from one
+/// sample to the next. It stands for the residual that a model without any error would leave of perfect speeds: no
+/// model is that good. A speed that only repeats shows nothing of its step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rounding {
     quantum_mps: f64,

@@ -1,12 +1,13 @@
 //! How late and how strong brakes are, learned from braking to braking.
 //!
-//! A brake that lags does so at every stop: with a lateness of mean zero each of a hundred departures pushes the resistance
-//! at low speed the same way, by less than its standard deviation, and all of them by far more.
+//! A lagging brake lags at every stop. If its lateness were taken to have mean zero, each of a hundred departures would
+//! push the resistance at low speed the same way, by less than its standard deviation, and all of them together by far
+//! more.
 
 use super::motion_filter::{BRAKE_ERROR, FilterStep, Following, STATES};
 use crate::filter::Gaussian;
 
-/// Weight that a standard deviation beforehand counts for, and what is looked back over.
+/// Weight that a standard deviation beforehand counts for, and the weight of the memory.
 const WEIGHT_FIRST: f64 = 2.0;
 const WEIGHT_MAX: f64 = 40.0;
 /// Greatest square of an error over its variance that counts: a brake that fails is no measure of the others.
@@ -14,7 +15,7 @@ const SEEN_MAX: f64 = 30.0;
 /// Least standard deviation as a share of the first: brakings differ from each other.
 const LEAST_SHARE: f64 = 0.1;
 
-/// Standard deviation of a brake's error, learned by the squares of what is believed of it.
+/// Standard deviation of a brake's error, learned from the squares of the estimated error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LearnedStd {
     /// The standard deviation.
@@ -31,8 +32,8 @@ impl LearnedStd {
 
     /// Takes in the mean and the variance of an error of variance 1, of which so much is new.
     ///
-    /// The mean's square has one less the variance as its expectation, and says the more the smaller that is. Returns the
-    /// share of what is learned now in all that is looked back over.
+    /// The square of the mean has the expectation 1 - variance, and is the more informative the smaller the variance.
+    /// Returns the weight of this step as a share of the weight of the memory.
     fn learn(&mut self, (mean, variance): (f64, f64), renewed: f64) -> f64 {
         let known = (1.0 - variance).max(0.0);
         if known < 1e-3 {
@@ -47,7 +48,7 @@ impl LearnedStd {
     }
 }
 
-/// How late a brake is, as a share of what the slowest brake would lack.
+/// How late a brake is, as a share of the impulse that the slowest brake would lack.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lateness {
     /// The mean: the same at every stop, an error that no standard deviation stands for.
@@ -93,7 +94,7 @@ impl BrakeErrors {
         &self.late[following as usize]
     }
 
-    /// Learns from what is believed after a step.
+    /// Learns from the estimate after a step.
     ///
     /// # Real-time
     ///

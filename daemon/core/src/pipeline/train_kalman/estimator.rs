@@ -1,4 +1,4 @@
-//! The estimator, from samples to its report.
+//! The estimator of `train_kalman`, from samples to its report.
 
 mod judgement;
 
@@ -23,10 +23,10 @@ use crate::pipeline::output::{DAVIS, contract_unit, write_innovations};
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, KeptEstimate, Outcome, UseBefore};
 
-/// Motion in s before anything is called known; after a warm start, before it is confirmed.
+/// Motion in s before any quantity is called known; after a warm start, before it is confirmed.
 const MOVED_MIN_S: f64 = 20.0;
 const CONFIRMED_S: f64 = 3.0;
-/// Standard deviation in N/kN of the brake force from which speeds say nothing of the noise and of the model.
+/// Standard deviation in N/kN of the brake force from which speeds say nothing of their noise or of the model.
 const JUDGED_BRAKE_STD: f64 = 1.0;
 /// Deviations by which a first sample may differ from a kept mass that still counts.
 const KEPT_DEVIATIONS: f64 = 3.0;
@@ -150,7 +150,7 @@ impl TrainKalman {
         Outcome::Updated
     }
 
-    /// Learns the noise of speeds and of forces that jump from what a speed said.
+    /// Learns the noise of speeds, and of forces that jump, from a measured speed.
     fn learn(&mut self, measured: &SpeedLikelihood, speed_mps: f64) {
         self.learned.monitor.push(measured.trust.normalised);
         let belief = &self.learned.bank.likeliest().belief;
@@ -182,8 +182,8 @@ impl TrainKalman {
         self.resets += 1;
     }
 
-    /// True for a sample of a train that moves fast enough, by the samples before it: a bound on the
-    /// newest speed itself would let in what noise makes faster and keep out what it makes slower.
+    /// True for a sample of a train that moves fast enough, judged by the samples before it: a bound on the newest
+    /// speed itself would admit speeds that noise raises and keep out those that noise lowers.
     fn is_under_way(&mut self, sample: &ResolvedSample) -> bool {
         let least_mps = self.settings.speed_min_mps;
         let was_fast = std::mem::replace(&mut self.is_fast, sample.speed_mps >= least_mps);
@@ -196,7 +196,7 @@ impl TrainKalman {
         }
     }
 
-    /// Takes up what was kept with the first sample; true when its mass counts. A train that moves again so soon
+    /// Takes up the kept estimate with the first sample; true when its mass counts. A train that moves again so soon
     /// has not stood long enough for another load.
     fn take_up(&mut self, kept: &Kept, sample: &ResolvedSample) -> bool {
         let interrupted_s = kept.use_before.interrupted_s(sample.time_ns);

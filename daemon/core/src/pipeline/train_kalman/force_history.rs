@@ -1,6 +1,6 @@
-//! Forces as they act, some time behind their report.
+//! Forces as they act, some time after their report.
 
-/// Reports kept: more than a second of 50 a second; of faster ones a shorter time is looked back.
+/// Number of reports kept: more than a second of them at 50 per second; of faster reports the history is shorter.
 const CAPACITY: usize = 64;
 
 /// A report: time in s, forces in N/kN, and their impulses in N/kN s since the first.
@@ -21,10 +21,10 @@ pub struct ForceHistory {
     origin_ns: i64,
 }
 
-/// Forces over a step, each of traction and brake.
+/// Forces over a step: traction, then brake.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Acting {
-    /// How long in s it was reported before.
+    /// Time in s between the report of the force and the force itself.
     pub delay_s: f64,
     /// Impulse in N/kN s.
     pub impulses: [f64; 2],
@@ -45,7 +45,7 @@ impl Default for ForceHistory {
 }
 
 impl ForceHistory {
-    /// Takes in a report of traction and brake force in N/kN; another segment forgets what was before.
+    /// Takes in a report of traction and brake force in N/kN; a new segment erases the reports before it.
     ///
     /// # Real-time
     ///

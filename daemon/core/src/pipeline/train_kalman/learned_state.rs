@@ -1,4 +1,4 @@
-//! State before the first sample, and everything that samples teach and an unexplained braking must not teach.
+//! The state before the first sample, and everything that samples teach but an unexplained braking must not.
 
 use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};
@@ -26,7 +26,7 @@ pub struct LearnedState {
     pub noise: SpeedNoise,
     /// Contribution of forces that jump between two samples.
     pub jumps: JumpShare,
-    /// How far brakes are off.
+    /// How late and how strong brakes are.
     pub brake: BrakeErrors,
     /// Innovations so far.
     pub monitor: InnovationMonitor,
@@ -45,7 +45,7 @@ impl LearnedState {
     }
 }
 
-/// Weight that the first share counts for, and what is looked back over.
+/// Weight that the first share counts for, and the weight of the memory.
 const WEIGHT_FIRST: f64 = 3.0;
 const WEIGHT_MAX: f64 = 300.0;
 /// Share of an innovation's variance from which it says something of jumps.

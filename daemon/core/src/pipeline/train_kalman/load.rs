@@ -1,4 +1,4 @@
-//! Estimate of the load, and the times at which it may have changed.
+//! Estimate of the load, and the times at which the load may have changed.
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::TrainModel;
@@ -7,13 +7,13 @@ use crate::pipeline::motion::{StopWatch, is_same_mass};
 
 use super::TrainKalmanSettings;
 
-/// Change of the load's estimate by a sample: the declared mass over the true one.
+/// Change by a sample of the load factor's estimate: the declared mass over the true one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LoadChange {
-    /// It is as far as known as a new weighing or a declaration allows: a mean and a variance.
+    /// The load factor starts anew, as well known as a new weighing or the declaration allows: a mean and a variance.
     Anew(f64, f64),
-    /// It may have become another one by this variance as a share of its square, up to that of any load of this mean and
-    /// variance.
+    /// The load may have changed by this variance as a share of its square, at most to the uncertainty of any load of
+    /// this mean and variance.
     Opened { by: f64, mean: f64, variance: f64 },
 }
 
@@ -25,7 +25,7 @@ pub struct LoadWatch {
     /// Mean and standard deviation where samples carry no mass.
     declared: (f64, f64),
     load_change_std: f64,
-    /// Mass in kg that the load factor refers to, once there was a sample.
+    /// Mass in kg that the load factor refers to; `None` before the first sample.
     declared_kg: Option<f64>,
     /// True when the newest samples carry a mass.
     pub is_weighed: bool,
@@ -58,7 +58,7 @@ impl LoadWatch {
         }
     }
 
-    /// Mean and variance of the load factor by what the samples or the train's file say of it.
+    /// Mean and variance of the load factor according to the samples or the train's file.
     pub fn prior(&self) -> (f64, f64) {
         let (mean, std) = if self.is_weighed { (1.0, self.mass_std) } else { self.declared };
         (mean, std * std)
@@ -69,7 +69,7 @@ impl LoadWatch {
         self.declared_kg.unwrap_or(train_kg)
     }
 
-    /// Takes a sample in; what it changes in what is known of the load.
+    /// Takes a sample in; returns the change that it makes to the knowledge of the load.
     pub fn see(&mut self, sample: &ResolvedSample) -> Option<LoadChange> {
         self.is_weighed = sample.is_mass_measured;
         self.has_departed = self.stops.departs(sample.time_ns, sample.segment, sample.speed_mps);

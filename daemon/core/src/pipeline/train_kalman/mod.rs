@@ -1,14 +1,14 @@
 //! `train_kalman`: running resistance and mass of a train as one estimate.
 //!
-//! With u the declared mass over the true one the balance of forces is linear in what is unknown:
+//! With u the declared mass over the true one the balance of forces is linear in the unknowns:
 //!
 //! ```text
 //! s dv/dt = u ((1 + t) traction - (1 + r) brake) - known - (a + b v + c v²) - d,   s = 1000 (1 + gamma) / g
 //! ```
 //!
-//! in N per kN of weight: traction and braking determine u, coasting and cruising a, b, c, gradients
-//! both. Whoever takes the mass for exact puts its error into the resistance, and the other way round;
-//! here each is known as well as the other allows, and their covariance says how they depend.
+//! in N per kN of weight: traction and braking determine u, coasting and cruising a, b, c, gradients both. An estimator
+//! that took the mass for exact would put its error into the resistance, and the other way round; here each is known as
+//! well as the other allows, and their covariance says how they depend on each other.
 
 use dynocar_model::terms::{delay, masses, traction};
 
@@ -48,8 +48,8 @@ settings! {
         drift_n_per_kn_per_sqrt_h: f64 = 0.01 => (0 to 10 "N/kN");
         /// Standard deviation of the scale of the traction force: 0.01 is 1 %.
         force_scale_std: f64 = traction::USUAL_STD => (0.000001 to 0.5);
-        /// Standard deviation of the brake force as a share of what is reported: friction goes with heat,
-        /// moisture and wear, and is blended with an electric brake.
+        /// Standard deviation of the brake force as a share of the reported force: friction changes with heat, moisture
+        /// and wear, and is blended with an electric brake.
         brake_scale_std: f64 = 0.3 => (0.000001 to 1);
         /// Time in s within which the brake follows its report, as a time constant; a faster one is none
         /// the worse.

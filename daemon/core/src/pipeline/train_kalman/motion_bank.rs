@@ -1,4 +1,4 @@
-//! Filters side by side, one for each way in which the force that no model knows may behave.
+//! Filters side by side, one for each way in which the force that the model does not know may behave.
 
 use nalgebra::{Matrix4, Vector3, Vector4};
 
@@ -16,11 +16,11 @@ const LOG_WEIGHT_MIN: f64 = -30.0;
 const EVIDENCE_MEMORY_S: f64 = 600.0;
 /// Variance in (m/s)² of a wind that is taken for known.
 const WIND_LEAST: f64 = 1e-12;
-/// Behaviours of a smaller share are left out of what is published.
+/// Behaviours of a smaller share are left out of the published estimate.
 const SHARE_MIN: f64 = 1e-4;
 
-/// Standard deviation in N/kN of the brake force by its lateness from which speeds say nothing else: a brake whose response
-/// is unknown teaches neither train nor line.
+/// Standard deviation in N/kN of the brake force by its lateness from which speeds say nothing else: a brake whose
+/// response is unknown gives no information about train or line.
 const LATE_UNKNOWN: f64 = 3.0;
 
 /// Leaves all states but the speed and the brake's error, with their covariance, as they were before a measurement; how
@@ -89,7 +89,7 @@ impl MotionBank {
         MotionBank { rivals }
     }
 
-    /// Changes what every filter believes.
+    /// Changes the belief of every filter.
     pub fn each(&mut self, change: impl Fn(&mut Gaussian<STATES>)) {
         self.rivals.hypotheses_mut().iter_mut().for_each(|it| change(&mut it.filter.belief));
     }
@@ -196,8 +196,8 @@ impl MotionBank {
         let Gaussian { mean, covariance } = mixture.belief;
         let parts = Vector3::new(1.0, by_wind, direction);
         let variance = parts.dot(&(covariance.fixed_view::<3, 3>(4, 4) * parts));
-        // The filters take the wind by the declared air resistance. What it leaves open grows with the mean
-        // square of the one that is learned.
+        // The filters compute the wind's force by the declared air resistance. The uncertainty that remains grows with
+        // the mean square of the learned air resistance.
         let square = mean[2] * mean[2] + covariance[(2, 2)];
         let excess = if c > 0.0 { (square / (c * c) - 1.0).max(0.0) } else { 0.0 };
         let with_wind = covariance.fixed_view::<4, 1>(0, 5).into_owned();

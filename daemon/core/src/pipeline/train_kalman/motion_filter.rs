@@ -1,5 +1,5 @@
-//! A Kalman filter of speed, disturbance, load and resistance over the steps between samples, and
-//! how a force that no model knows may behave in time.
+//! A Kalman filter of speed, disturbance, load and resistance over the steps between samples, and the ways in which a
+//! force that the model does not know may behave in time.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -9,7 +9,7 @@ use crate::pipeline::motion::jump_variance;
 
 /// Index of the speed in m/s.
 pub const SPEED: usize = 0;
-/// Index of the force that no model knows, in N/kN, retarding.
+/// Index of the force that the model does not know, in N/kN, retarding.
 pub const DISTURBANCE: usize = 1;
 /// Index of the declared mass over the true one.
 pub const LOAD: usize = 2;
@@ -17,9 +17,9 @@ pub const LOAD: usize = 2;
 pub const RESISTANCE: usize = 3;
 /// Index of the error of the traction force's scale.
 pub const TRACTION_SCALE: usize = 6;
-/// Index of what of the brake force is not as reported, over its standard deviation at the time.
+/// Index of the brake force beyond its report, over its standard deviation at the time.
 pub const BRAKE_ERROR: usize = 7;
-/// Index of the delay in s of a force behind its report.
+/// Index of the delay in s between the report of a force and the force itself.
 pub const FORCE_DELAY: usize = 8;
 /// Index of the wind along the line in m/s, a headwind where the chainage grows.
 pub const WIND: usize = 9;
@@ -45,7 +45,7 @@ const INTEGRATION_SHARE: f64 = 1e-4;
 /// Time in s over which a wind becomes another one.
 const WIND_TIME_S: f64 = 7200.0;
 
-/// Share of a wind that is left after a time in s, and the variance of what comes to it.
+/// Returns the share of a wind that is left after a time in s, and the variance of the new wind in its place.
 pub fn wind_over(time_s: f64, std_mps: f64) -> (f64, f64) {
     let keep = (-time_s / WIND_TIME_S).exp();
     (keep, std_mps * std_mps * (1.0 - keep * keep))
@@ -86,7 +86,7 @@ pub struct FilterStep {
     pub delay_s: f64,
     /// Impulse of the traction force in N/kN s, if it acts so much later.
     pub traction: f64,
-    /// Impulse of the brake force, retarding, likewise, with what it is expected to exert late.
+    /// Impulse of the brake force, retarding, if it acts so much later, with the expected force of a late brake.
     pub brake: f64,
     /// Impulse of all that is known to retard beyond the basic resistance.
     pub known: f64,
@@ -115,11 +115,11 @@ pub struct FilterStep {
     pub by_wind: f64,
     /// Addition of its square in N/kN, headwind or tailwind.
     pub by_wind_square: f64,
-    /// Share of the wind that is left, and the variance in (m/s)² of what comes to it.
+    /// Share of the wind that is left, and the variance in (m/s)² of the new wind in its place.
     pub wind: (f64, f64),
     /// Variance that comes to the scale of the brake force.
     pub brake_drift_variance: f64,
-    /// Share of the brake's error that is left, and the variance of what comes to it.
+    /// Share of the brake's error that is left, and the variance of the new error in its place.
     pub brake_error: (f64, f64),
 }
 
@@ -228,7 +228,7 @@ pub struct Behaviour {
     pub std_n_per_kn: f64,
     /// Correlation time in s.
     pub time_s: f64,
-    /// Standard deviation in ‰ of the map beyond what is stated.
+    /// Standard deviation in ‰ of the map beyond the stated one.
     pub map_std_permille: f64,
     /// Logarithm of its probability before any sample.
     pub log_prior: f64,
@@ -237,8 +237,8 @@ pub struct Behaviour {
 /// Number of behaviours.
 pub const BEHAVIOURS: usize = 7;
 
-/// Standard deviation in N/kN, correlation time in s, standard deviation in ‰ of the map beyond what is stated, and
-/// probability before any sample: nothing but what models always miss; a poor map; wind; gusts.
+/// Standard deviation in N/kN, correlation time in s, standard deviation in ‰ of the map beyond the stated one, and
+/// probability before any sample: only the small forces that every model misses; a poor map; wind; gusts.
 const TABLE: [(f64, f64, f64, f64); BEHAVIOURS] = [
     (0.02, 60.0, 0.0, 0.30),
     (0.02, 60.0, 0.1, 0.20),
@@ -260,7 +260,8 @@ pub fn behaviours() -> [Behaviour; BEHAVIOURS] {
 }
 
 impl Behaviour {
-    /// Returns the share of the force that is left after a time in s, and the variance in (N/kN)² of what comes to it.
+    /// Returns the share of the force that is left after a time in s, and the variance in (N/kN)² of the new force in
+    /// its place.
     pub fn over(&self, time_s: f64) -> (f64, f64) {
         let keep = (-time_s / self.time_s).exp();
         (keep, self.std_n_per_kn.powi(2) * (1.0 - keep * keep))

@@ -11,10 +11,10 @@ use crate::pipeline::momentum::{regressors, unscaling};
 use crate::pipeline::motion::SpeedRange;
 use crate::pipeline::output::{DAVIS_AND_MASS, excitation, write_parameters};
 
-/// Index of the load factor among what is published.
+/// Index of the load factor among the published values.
 const LOAD: usize = COEFFICIENTS;
 
-/// A judgement with hysteresis: what is known becomes unknown only well beyond where it became known.
+/// A judgement with hysteresis: a known quantity becomes unknown only well beyond the limit at which it became known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Level {
     enter_below: f64,
@@ -24,7 +24,7 @@ pub struct Level {
 }
 
 impl Level {
-    /// Known from a relative standard deviation on, until another one is passed.
+    /// Returns a level that becomes known below one relative standard deviation, and unknown above another.
     pub const fn new(enter_below: f64, leave_above: f64) -> Self {
         Level { enter_below, leave_above, is_known: false }
     }
@@ -80,8 +80,8 @@ impl TrainKalmanReport {
         report
     }
 
-    /// Takes over what is believed now, its covariance times a factor and widened by what is
-    /// systematic, and judges it at the speeds driven.
+    /// Takes over the present estimate, its covariance times a factor and widened by the systematic errors, and judges
+    /// it at the speeds driven.
     pub fn take(
         &mut self,
         published: &Published,
@@ -233,7 +233,7 @@ impl Systematic {
     pub fn widen(&self, mean: &Vector4<f64>, covariance: &mut Matrix4<f64>) {
         let scale = self.scale_std * self.scale_std;
         let mut by_scale = mean * mean.transpose() * scale;
-        // Whatever scales the accelerations scales resistance and mass alike: u the other way.
+        // A factor of the accelerations scales resistance and mass alike: u by its inverse.
         for i in 0..3 {
             by_scale[(i, 3)] = -by_scale[(i, 3)];
             by_scale[(3, i)] = -by_scale[(3, i)];

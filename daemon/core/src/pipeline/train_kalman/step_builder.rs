@@ -1,4 +1,4 @@
-//! From one sample to the next: forces as they act, and how fast forces and line change.
+//! The step from one sample to the next: forces as they act, and how fast forces and line change.
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::wind;
@@ -13,12 +13,12 @@ use crate::pipeline::momentum::UnitSample;
 
 /// How long a change of force is remembered, in s.
 const FORCE_RATE_MEMORY_S: f64 = 0.5;
-/// Time in s over which the change of what is known to retard is averaged: positions with noise let the
-/// gradient jump to and fro, the more often the more samples there are.
+/// Time in s over which the change of the known retarding forces is averaged: positions with noise let the gradient
+/// jump to and fro, the more often the more samples there are.
 const KNOWN_RATE_MEMORY_S: f64 = 1.0;
 
-/// Change of speed in m/s, and time in s, over which what a brake exerts beside its report becomes something else: friction
-/// goes with speed, is blended by speed, and heats up in a long descent.
+/// Change of speed in m/s, and time in s, over which the difference between brake force and report becomes another one:
+/// friction depends on speed, is blended by speed, and heats up in a long descent.
 const BRAKE_ERROR_MPS: f64 = 3.0;
 const BRAKE_ERROR_TIME_S: f64 = 600.0;
 
@@ -59,7 +59,7 @@ pub struct StepBuilder {
     acting: ForceHistory,
     /// Fastest change of the reported force lately in N/kN per s.
     force_rate: f64,
-    /// Change of what is known to retard in N/kN per s.
+    /// Change of the known retarding forces in N/kN per s.
     known_rate: f64,
     /// Brake force in N/kN of a brake as slow as may be, and the time in ns it refers to.
     followed: f64,
@@ -69,7 +69,8 @@ pub struct StepBuilder {
     is_stopping: bool,
     /// True from a standstill until the brake that held the train is released.
     was_held: bool,
-    /// Direction between an error of the brake's scale and one of its time, of the newest step: one says nothing of the other.
+    /// Direction between an error of the brake's scale and one of its time, of the newest step: one says nothing of the
+    /// other.
     brake_angle: f64,
     /// How often the brake's error was renewed since it was used last.
     renewals: f64,
@@ -104,7 +105,7 @@ impl StepBuilder {
         }
     }
 
-    /// Takes in what is reported, also at a standstill.
+    /// Takes in the reported forces, also at a standstill.
     pub fn see(&mut self, now: &UnitSample) {
         self.acting.see((now.time_ns, now.segment), [now.traction, now.brake]);
         let (seen_ns, segment) =
@@ -175,8 +176,8 @@ impl StepBuilder {
         }
     }
 
-    /// The step to the newest sample, if forces act by so much in s behind their report; what only the
-    /// estimator knows is left to it.
+    /// Returns the step to the newest sample, if forces act by so much in s after their report; the estimator adds the
+    /// parts that it alone knows.
     ///
     /// # Real-time
     ///

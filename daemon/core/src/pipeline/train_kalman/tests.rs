@@ -17,7 +17,7 @@ fn driven(estimator: &mut TrainKalman, from_s: u32, duration_s: u32) -> Paramete
     braked(estimator, from_s, duration_s, 1.0)
 }
 
-/// The same with a brake that exerts a share of what it reports.
+/// The same with a brake that exerts a share of the force that it reports.
 fn braked(
     estimator: &mut TrainKalman,
     from_s: u32,

@@ -11,7 +11,7 @@ use super::step::{StepRule, TrajectoryStep};
 use super::unit_disturbance::UnitDisturbance;
 use super::{A, B, C, SPEED};
 
-/// How often measured speeds are wrong, and how.
+/// How often measured speeds are outliers, and their distribution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutlierModel {
     /// Share of outliers.
@@ -22,8 +22,8 @@ pub struct OutlierModel {
 
 /// State and covariance under one hypothesis.
 ///
-/// The state is extended over a step by the step's derivatives; the covariance factor stays
-/// triangular without a factorisation, since a step moves the speed alone.
+/// Over a step the state is linearised by the step's derivatives; the covariance factor stays triangular without a
+/// factorisation, since a step moves the speed alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JumpHypothesis {
     /// a, b, c and v in the order of [`crate::xia::trajectory`].
@@ -87,13 +87,13 @@ impl JumpHypothesis {
         &self.unit
     }
 
-    /// Returns the covariance of the coefficients over what the learned density of the disturbance leaves
-    /// open: the filter's own holds for the likeliest density.
+    /// Returns the covariance of the coefficients averaged over the uncertain density of the disturbance: the filter's
+    /// own covariance holds for the likeliest density.
     pub fn davis_covariance_over_noise(&self, model: &NoiseModel) -> Matrix3<f64> {
         self.davis_covariance() + self.unit.of_davis() * self.noise.density_surplus(model)
     }
 
-    /// Takes the speed from a measurement alone; the coefficients keep what they know.
+    /// Takes the speed from a measurement alone; the knowledge of the coefficients stays.
     pub fn anchor(&mut self, speed_mps: f64) {
         self.state[SPEED] = speed_mps;
         for column in [A, B, C] {
@@ -154,8 +154,8 @@ impl JumpHypothesis {
         self.age_s += duration_s;
     }
 
-    /// Takes in a measured speed, or leaves it out when it more likely is an outlier; whoever
-    /// compares hypotheses weighs them by the likelihood.
+    /// Takes in a measured speed, or leaves it out when it more likely is an outlier; a caller that compares hypotheses
+    /// weights them by the likelihood.
     ///
     /// # Real-time
     ///

@@ -26,7 +26,7 @@ settings! {
     TrajectoryKalmanSettings {
         /// Standard deviations of the declared coefficients, as a share of each.
         prior_relative_std: f64 = 0.5 => (above 0);
-        /// Evidence in nats that it takes to believe in a jump of the coefficients (rain, wind, a
+        /// Evidence in nats that it takes to accept a jump of the coefficients (rain, wind, a
         /// change of the train) within a given second. Disturbances that last, as no noise model
         /// here has them, look like jumps: less evidence is quicker and more often wrong.
         jump_evidence: f64 = 16.0 => (1 to 1000 "nats");

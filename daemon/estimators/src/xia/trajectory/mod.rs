@@ -5,8 +5,8 @@
 //! - [`motion`]: from resolved samples to steps
 //! - [`residuals`], [`fit`]: Dynocar's own method, offline and over windows
 //! - [`hypothesis`], [`noise`], [`online`]: Dynocar's own method, sample by sample
-//! - [`quality`]: whether an estimate may be trusted
-//! - [`A`], [`B`], [`C`], [`SPEED`]: places in vectors and matrices
+//! - [`quality`]: whether an estimate may be used
+//! - [`A`], [`B`], [`C`], [`SPEED`]: indices in vectors and matrices
 
 pub mod fit;
 pub mod hypothesis;

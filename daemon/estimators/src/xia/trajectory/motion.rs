@@ -1,5 +1,5 @@
-//! Steps that can be integrated, from resolved samples, and the recent force that the estimated model leaves
-//! unexplained.
+//! Steps that can be integrated, made from resolved samples, and the recent force that the estimated model does not
+//! explain.
 
 use dynocar_core::pipeline::motion::MOVING_MPS;
 use dynocar_model::force::ResolvedSample;
@@ -8,7 +8,7 @@ use dynocar_shared::{ParameterSnapshot, RejectionReason};
 
 use super::step::{StepRule, TrajectoryStep};
 
-/// Addition of a sample to a trajectory.
+/// Change that a sample makes to a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MotionUpdate {
     /// The trajectory begins anew at this sample's speed: the forces up to here are not known.
@@ -17,11 +17,11 @@ pub enum MotionUpdate {
     Continue(MotionStep),
     /// The train stands; a trajectory ends.
     Standstill,
-    /// The sample cannot be used; a trajectory ends.
+    /// The sample cannot be used; the trajectory ends.
     Unusable(RejectionReason),
 }
 
-/// The way from one sample to the next.
+/// The motion from one sample to the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionStep {
     /// Time in s.

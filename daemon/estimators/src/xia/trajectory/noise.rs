@@ -1,10 +1,10 @@
-//! The noise of the measured speed and the density of disturbing forces, learned on the way.
+//! The noise of the measured speed and the density of disturbing forces, learned from the innovations.
 //!
 //! Recursive maximum likelihood (Ljung, Söderström 1983, section 3.6) for ln R and ln q: the
 //! innovation e of a filter and its variance S have derivatives with respect to both, which
 //! follow scalar recursions next to the filter's own. The step is the score over the Fisher
-//! information of the samples remembered. While the coefficients are uncertain, the innovations
-//! say little of q, their derivatives are small, and q waits.
+//! information of the samples remembered. While the coefficients are uncertain, the innovations say little of q: their
+//! derivatives are small, and q hardly changes.
 
 use nalgebra::{Matrix2, Vector2};
 

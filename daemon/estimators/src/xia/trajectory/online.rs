@@ -1,10 +1,9 @@
 //! The online filter of `trajectory_kalman`: a bank of hypotheses about when (a, b, c) last jumped.
 //!
-//! Rain, wind or a tunnel change the resistance at once. A single filter either forgets, and
-//! pays with noise all the time, or it does not, and is wrong for long after a jump. The bank
-//! follows several filters instead, each of which opened its coefficients at another time, and
-//! weighs them by the likelihood of the speeds (Andersson 1985, adaptive forgetting by multiple
-//! models; Adams, MacKay 2007, run lengths). Ages are kept about evenly on a logarithmic scale:
+//! Rain, wind or a tunnel change the resistance at once. A single filter either forgets, and pays with noise all the
+//! time, or it does not, and is wrong for long after a jump. The bank follows several filters instead, each of which
+//! freed its coefficients at another time, and weights them by the likelihood of the speeds (Andersson 1985, adaptive
+//! forgetting by multiple models; Adams, MacKay 2007, run lengths). Ages are kept about evenly on a logarithmic scale:
 //! when the bank is full, the two hypotheses closest in relative age become one.
 
 use dynocar_core::filter::Gaussian;
@@ -26,14 +25,14 @@ const OUTLIERS: OutlierModel = OutlierModel { share: 0.01, density: 0.5 };
 /// Blocks of 30 s that the long-run variance of the innovations looks back over.
 const LONG_RUN_BLOCKS: f64 = 60.0;
 
-/// How the online filter starts and what it expects.
+/// Prior and expectations of the online filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OnlineSettings {
     /// Coefficients before any data.
     pub davis: Davis,
     /// Their standard deviations, before any data and of a jump.
     pub davis_std: Vector3<f64>,
-    /// Evidence in nats (logarithm of the likelihood ratio) that it takes to believe in a jump
+    /// Evidence in nats (logarithm of the likelihood ratio) that it takes to accept a jump
     /// within a given second; minus the logarithm of the mean time in s between jumps.
     pub jump_evidence: f64,
     /// The most hypotheses about the last jump, from 1 to 16.
@@ -48,10 +47,10 @@ impl OnlineSettings {
     }
 }
 
-/// Uncertainty of a single step's errors, whatever the hypothesis.
+/// Uncertainty of a single step's errors, the same under every hypothesis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StepDoubt {
-    /// Variance in (m/s)² of what the step misses because forces may jump within it.
+    /// Variance in (m/s)² of the error of the step because forces may jump within it.
     pub impulse_variance: f64,
     /// Variance in (m/s)² of the rounding of the speed after it.
     pub rounding_variance: f64,
@@ -114,7 +113,7 @@ impl OnlineFilter {
         self.bank.likeliest()
     }
 
-    /// Takes a speed as the start of a trajectory; the coefficients keep what they know.
+    /// Takes a speed as the start of a trajectory; the knowledge of the coefficients stays.
     pub fn begin(&mut self, measured_mps: f64) {
         self.bank.hypotheses_mut().iter_mut().for_each(|it| it.anchor(measured_mps));
         self.long_run.break_here();
@@ -147,7 +146,7 @@ impl OnlineFilter {
             }
         }
         self.bank.settle_odds();
-        // Also drops what became NaN because no weight is above 0.
+        // Also drops hypotheses whose weight became NaN because no weight is above 0.
         self.bank.drop_up_to(WEIGHT_MIN);
         let Some(innovation) = of_likeliest.filter(|_| !self.hypotheses().is_empty()) else {
             self.start_from(self.settings.first(&self.settings.davis));

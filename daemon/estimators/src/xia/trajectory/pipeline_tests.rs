@@ -17,7 +17,7 @@ use crate::EstimatorSettings;
 use crate::xia::newton::TrajectoryNewton;
 use crate::xia::newton::{FitMethod, TrajectoryNewtonSettings};
 
-/// Returns the metro as declared: a fifth off in every coefficient.
+/// Returns the metro as declared: every coefficient is wrong by a fifth.
 fn train() -> Arc<TrainModel> {
     Arc::new(TrainModel {
         name: "metro".into(),

@@ -4,12 +4,11 @@
 //! driven speeds is known well. The status therefore rests on w0 over the driven speeds; which
 //! coefficients the data excited is stated with it.
 //!
-//! Disturbances that last widen the intervals: gradient errors, wind and force errors last for tens of seconds, and
-//! the learned noise is white.
-//! Sums of normalised innovations over blocks show what that leaves out: their mean square over
-//! the block's length is 1 for white innovations and the long-run variance otherwise. The
-//! estimate is nearly linear in the innovations with weights that change slowly, so that its
-//! covariance grows by the same factor (Newey, West 1987, with a flat kernel over blocks).
+//! Disturbances that last widen the intervals: gradient errors, wind and force errors last for tens of seconds, but the
+//! learned noise is white. Sums of normalised innovations over blocks show the part that white noise leaves out: their
+//! mean square over the block's length is 1 for white innovations and the long-run variance otherwise. The estimate is
+//! nearly linear in the innovations with weights that change slowly, so that its covariance grows by the same factor
+//! (Newey, West 1987, with a flat kernel over blocks).
 
 use dynocar_core::pipeline::InnovationMonitor;
 use dynocar_core::pipeline::judge::{Judgement, LONG_RUN_MAX, StatusInputs};
@@ -19,12 +18,12 @@ use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{Manoeuvre, ParameterSnapshot, Reason, Status};
 use nalgebra::{Matrix3, Vector3};
 
-/// Standard deviation of w0 over w0 above which an estimate is degraded.
+/// Standard deviation of w0, as a share of w0, above which an estimate is degraded.
 const W0_DEVIATION_MAX: f64 = 0.1;
 /// A coefficient is excited when the data have cut its prior standard deviation to this share.
 const EXCITED_SHARE: f64 = 0.5;
-/// Returns the standard deviations of declared coefficients, as a share of each, or of a fifth of the
-/// resistance at the train's highest speed where one is declared small or zero.
+/// Returns the standard deviations of declared coefficients: a share of each, or of a fifth of the resistance at the
+/// train's highest speed for a coefficient that is declared small or zero.
 pub fn prior_std(train: &TrainModel, relative: f64) -> Vector3<f64> {
     let davis = &train.resistance;
     let speed_mps = train.speed_max_mps().filter(|speed| *speed > 1.0).unwrap_or(30.0);
@@ -36,7 +35,7 @@ pub fn prior_std(train: &TrainModel, relative: f64) -> Vector3<f64> {
     )
 }
 
-/// An estimate with what is needed to judge it.
+/// An estimate with the evidence by which it is judged.
 #[derive(Clone, Copy, Debug)]
 pub struct DavisEstimate<'a> {
     /// The coefficients.

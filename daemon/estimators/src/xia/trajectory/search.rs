@@ -21,7 +21,7 @@ pub struct RatioFit {
     pass: ResidualSums,
     /// Noise that the residuals were divided by.
     used_noise_mps: f64,
-    /// Noise as given or, if it is to be estimated, as the residuals show it.
+    /// The given noise or, if the noise is to be estimated, the noise that the residuals show.
     noise_mps: f64,
     /// Noise that the residuals show.
     shown_mps: f64,

@@ -15,7 +15,7 @@
 use dynocar_model::train::Davis;
 use nalgebra::Vector3;
 
-/// Measure of a step's size, and with it the rule that leads over the step.
+/// Measure of a step's size, and thereby the rule that computes the speed after the step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StepRule {
     /// Size in m; eq. 7 of Xia 2023.
@@ -69,8 +69,8 @@ impl StepRule {
         }
     }
 
-    /// As [`StepRule::advance`], but a train that would stop rolls on at the stall speed,
-    /// whatever the parameters: a fit may start from parameters that stop the train.
+    /// As [`StepRule::advance`], but a train that would stop rolls on at the stall speed: a fit may start from
+    /// parameters that stop the train.
     #[inline(always)]
     pub fn advance_or_crawl(
         self,
@@ -117,7 +117,7 @@ fn advance_time(step: &TrajectoryStep, davis: &Davis, speed_mps: f64) -> Option<
     }
     let slope_middle = slope(davis, middle_mps);
     let middle_by_speed = 1.0 - 0.5 * reach * slope(davis, speed_mps);
-    // The regressors at the middle, less what the middle itself loses to the resistance.
+    // The regressors at the middle, less the resistance's effect on the middle speed itself.
     let inner = 0.5 * reach * slope_middle;
     let through = |at_middle: f64, at_start: f64| -reach * (at_middle - inner * at_start);
     Some(Advance {

@@ -23,7 +23,7 @@ pub fn normal(random: &mut ChaCha8Rng) -> f64 {
     radius * (std::f64::consts::TAU * random.random::<f64>()).cos()
 }
 
-/// Returns the traction, coasting and braking between 10 and 80 m/s over rolling ground.
+/// Returns steps of traction, coasting and braking between 10 and 80 m/s over rolling ground.
 pub fn steps(rule: StepRule, count: usize) -> Vec<TrajectoryStep> {
     (0..count)
         .map(|i| {

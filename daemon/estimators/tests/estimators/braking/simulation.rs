@@ -44,7 +44,7 @@ pub fn train() -> TrainModel {
     }
 }
 
-/// A braking run: what the rail carries and what the brake gives, over time and speed.
+/// A braking run: the adhesion of the rail and the force of the brake, over time and speed.
 pub struct Run {
     pub from_mps: f64,
     pub seconds: f64,

@@ -1,4 +1,4 @@
-//! Runs an estimator over a drive and holds what it calls `estimated` against the truth.
+//! Runs an estimator over a drive and compares the values that it calls `estimated` with the truth.
 
 use dynocar_core::pipeline::Pipeline;
 use dynocar_estimators::EstimatorSettings;
@@ -24,7 +24,7 @@ fn is_wrong(value: f64, std: f64, truth: f64) -> bool {
     !((value - truth).abs() <= (STDS_MAX * std).max(SHARE_MAX * truth.abs()))
 }
 
-/// Says what is trusted and wrong, if anything.
+/// Returns the value that is trusted and wrong, if there is one.
 fn misled(snapshot: &ParameterSnapshot, carried: f64) -> Option<String> {
     let mean_mps = 0.5 * (snapshot.speed_min_mps + snapshot.speed_max_mps);
     if let Some(estimate) = snapshot.resistance_at(mean_mps) {
@@ -36,7 +36,7 @@ fn misled(snapshot: &ParameterSnapshot, carried: f64) -> Option<String> {
     }
     let truths = [
         (Parameter::Mass, 1e-3 * MASS_KG),
-        // No wheel ever slides: the rail carried what the brake asked for.
+        // No wheel ever slides: the rail carried the force that the brake demanded.
         (Parameter::Adhesion, carried),
         (Parameter::DiscFriction, FRICTION),
         (Parameter::BrakingRatio, 2.55),

@@ -1,5 +1,5 @@
-//! Trust of the estimators in the samples of a simulator as a first user writes one: without noise, with it, or
-//! rounded, seen from any moment on, at any step.
+//! Trust of the estimators in the samples of a simulator as a first user writes one: without noise, with noise, or
+//! rounded, from any start and at any step.
 
 mod drive;
 mod judge;

@@ -1,4 +1,4 @@
-//! The live view as a process beside a controller and a daemon, with viewers that come, stall and go.
+//! The live view as a process next to a controller and a daemon, with viewers that come, stall and go.
 
 mod support;
 mod viewer;

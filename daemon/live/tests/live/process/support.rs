@@ -1,4 +1,4 @@
-//! A live view beside a daemon and a controller.
+//! A live view next to a daemon and a controller.
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};

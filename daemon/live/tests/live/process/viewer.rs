@@ -1,4 +1,4 @@
-//! A viewer: as much of the protocol as it takes to see and to stall.
+//! A viewer with the part of the protocol that it takes to see and to stall.
 
 use std::collections::HashMap;
 use std::io::ErrorKind;
@@ -47,7 +47,7 @@ impl Viewer {
         topics
     }
 
-    /// Takes one message, if there is one; what a channel brings is given.
+    /// Takes one message, if there is one; returns it when it is of a subscribed channel.
     fn take(&mut self) -> Option<ReceivedMessage> {
         match self.socket.read() {
             Ok(Message::Text(text)) => self.control(&serde_json::from_str(&text).unwrap()),
@@ -92,7 +92,7 @@ impl Viewer {
         }
     }
 
-    /// Takes messages until one is what is waited for.
+    /// Reads messages until the expected one arrives.
     pub fn await_seen(
         &mut self,
         what: &str,

@@ -1,9 +1,9 @@
-//! Functions without unit of one covariate u.
+//! Dimensionless functions of one covariate u.
 
 use crate::named;
 
 named! {
-    /// A form; its numbers have the unit of the covariate but for the exponent.
+    /// A form of such a function; its numbers have the unit of the covariate, except the exponent.
     Form ("in `train.toml`") {
         /// `(max(0, u) / at)^exponent`.
         Power "power";

@@ -1,17 +1,16 @@
-//! A force and its covariates.
+//! A force as a product of functions of covariates.
 
 use super::form::Form;
 use crate::named;
 
-/// A function without unit of one covariate.
+/// A dimensionless function of one covariate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CovariateFactor {
     /// Covariate of the law.
     pub of: Covariate,
-    /// How.
+    /// Form of the function.
     pub form: Form,
-    /// The numbers of the form, in the order of [`Form::numbers`]; a number that the form does not
-    /// have is not looked at.
+    /// The numbers of the form, in the order of [`Form::numbers`]; surplus numbers are ignored.
     pub numbers: [f64; 2],
 }
 
@@ -20,12 +19,13 @@ pub struct CovariateFactor {
 pub struct ExtraResistance {
     /// The resistance in N/kN where all factors are 1.
     pub n_per_kn: f64,
-    /// One or two.
+    /// The one or two factors.
     pub factors: Vec<CovariateFactor>,
 }
 
 impl CovariateFactor {
-    /// Returns its value and its slope over the speed in 1/(m/s); `None` where the covariate is not known.
+    /// Returns the value of the factor and its slope over the speed in 1/(m/s); `None` where the covariate is not
+    /// known.
     #[inline]
     fn at(&self, known: impl Fn(Covariate) -> Option<f64>) -> Option<(f64, f64)> {
         let (value, slope) = self.form.value_and_slope(self.numbers, known(self.of)?);
@@ -61,8 +61,8 @@ impl ExtraResistance {
         format!("{:.4} N/kN{}", self.n_per_kn, factors.collect::<String>())
     }
 
-    /// Returns the force in N/kN and its slope over the speed, for what is known of the covariates; none
-    /// where one that it takes is not.
+    /// Returns the force in N/kN and its slope over the speed, given the known covariates; 0 where a covariate of the
+    /// law is unknown.
     #[inline]
     pub fn at(&self, known: impl Fn(Covariate) -> Option<f64>) -> (f64, f64) {
         let joined = self.factors.iter().try_fold((1.0, 0.0), |(value, slope), factor| {

@@ -1,12 +1,12 @@
-//! A resistance of a form of its own, which no other term stands for.
+//! A resistance of a form of its own, which no other term covers.
 //!
 //! ```text
 //! w = n_per_kn · f1(x1) [· f2(x2)]
 //! ```
 //!
-//! in N/kN, of one or two factors without unit, each a [`Form`] of one [`Covariate`]. `explain`
-//! finds such a force where nothing of its library explains a residual; `[[extra]]` of
-//! `train.toml` holds it, and whoever knows a law from elsewhere may write it there.
+//! in N/kN, of one or two dimensionless factors, each a [`Form`] of one [`Covariate`]. `explain` finds such a force
+//! where nothing of its library explains a residual; `[[extra]]` of `train.toml` holds it, and a user who knows a law
+//! from elsewhere may write it there.
 
 mod form;
 mod law;
@@ -21,7 +21,7 @@ pub const FORCE_MAX_N_PER_KN: f64 = 100.0;
 /// Factors at most.
 pub const FACTORS_MAX: usize = 2;
 
-/// Forces of forms of their own resist; by their slope for speeds near this one, too.
+/// Adds forces of forms of their own to the resistance, with their slope for speeds near this one.
 #[inline]
 pub fn act(
     extras: &[ExtraResistance],
@@ -41,7 +41,7 @@ mod tests {
     use super::*;
     use crate::train::Davis;
 
-    /// Returns the force in N/kN at a speed by what is known at another, and at a temperature in °C.
+    /// Returns the force in N/kN at a speed, given the covariates at another speed and at a temperature in °C.
     fn resists_n_per_kn(
         extra: &ExtraResistance,
         (known_mps, degc): (f64, Option<f64>),

@@ -1,10 +1,10 @@
-//! The gate on single samples and on runs of them.
+//! The gate on single samples and on runs of samples.
 
 use super::*;
 use rand::{RngExt, SeedableRng};
 
 const STEP_S: f64 = 0.2;
-/// N of one N/kN on the train.
+/// Force in N that is 1 N/kN on the train.
 const UNIT_N: f64 = 981.0;
 
 /// Returns a sample of a train of 100 t on the level, at 20 m/s.
@@ -19,7 +19,7 @@ fn sample(index: usize, force_n_per_kn: f64) -> ResolvedSample {
     }
 }
 
-/// Times in s and forces in N/kN of the taken values, with the steps that lead there.
+/// Times in s and forces in N/kN of the samples taken, with the steps that lead to them.
 fn taken(gate: &mut ForceGate, samples: &[ResolvedSample]) -> Vec<(f64, f64, f64)> {
     let mut all = Vec::new();
     for it in samples {

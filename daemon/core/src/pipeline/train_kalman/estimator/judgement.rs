@@ -9,19 +9,20 @@ use crate::pipeline::judge::{
 
 /// Motion in s before the mass is called known.
 const MASS_MOVED_MIN_S: f64 = 3.0;
-/// All that this estimator answers.
+/// All quantities that this estimator answers.
 const COMPLETE: u32 = Quantity::Resistance.bit() | Quantity::Mass.bit();
-/// Innovations before they are judged to be alike.
+/// Number of innovations from which on they may be judged to be alike.
 const JUDGED_MIN: f64 = 100.0;
-/// Mean square from which on their likeness is judged: of speeds without noise, of which none is taken for
-/// better than [`crate::pipeline::motion::SpeedNoise`] allows, the smallest error of a model is alike.
+/// Mean square from which on the likeness of innovations is judged. No speed is taken for better than
+/// [`crate::pipeline::motion::SpeedNoise`] allows, so with speeds without noise innovations are small, and even the
+/// smallest error of a model makes them alike.
 const JUDGED_SQUARE_MIN: f64 = 0.1;
 
 impl TrainKalman {
     pub(super) fn long_run(&self) -> f64 {
         let monitor = &self.learned.monitor;
         let variance = long_run_variance(monitor.mean_square(), monitor.correlation());
-        // Whatever the order, this many innovations add up to no more.
+        // In any order, this many innovations add up to no more.
         variance.min(monitor.effective_count() * monitor.mean_square())
     }
 
@@ -36,8 +37,8 @@ impl TrainKalman {
         is_alike.then_some(Reason::InnovationsNotWhite)
     }
 
-    /// The quantities known after motion enough: the mass after some seconds of traction, the resistance
-    /// after a while, or once the first samples confirm what was kept.
+    /// The quantities known after enough motion: the mass after some seconds of traction, the resistance after a while,
+    /// or once the first samples confirm the kept estimate.
     pub(super) fn known_now(&self) -> u32 {
         let ready = |quantity: Quantity, after_s: f64| {
             u32::from(self.moved_s >= after_s.min(self.moved_min_s)) * quantity.bit()
@@ -57,8 +58,8 @@ impl TrainKalman {
         }
     }
 
-    /// A mass that only waits for the motion after a stop is called so. Before all is known, the status does not show
-    /// what speaks against the part that is.
+    /// A mass that only waits for the motion after a stop is called so. Before all quantities are known, the status
+    /// does not show a contradiction of those that are.
     pub(super) fn judgement(&self, input: &InputState) -> Judgement {
         let (status, reason) = self.case(input).verdict();
         let contradiction = self.contradiction();
