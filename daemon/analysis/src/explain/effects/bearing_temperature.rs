@@ -1,4 +1,4 @@
-//! Cold bearings that warm up.
+//! Cold bearings, whose resistance falls as they warm up.
 
 use dynocar_model::terms::extra::Covariate;
 use dynocar_model::terms::{Resistance, bearings};

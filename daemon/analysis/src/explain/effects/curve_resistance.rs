@@ -1,4 +1,4 @@
-//! Curve resistance k/R in N/kN with another k than declared (Röckl, Schmidt; declared k = 600).
+//! Curve resistance k/R in N/kN with another constant k than declared (Röckl, Schmidt; usually declared as 600).
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::curve;

@@ -1,4 +1,4 @@
-//! Extra resistance at certain places, in all runs or some, on the part of the train there.
+//! Extra resistance at certain places, in all runs or some, on the part of the train that is there.
 
 use std::sync::Arc;
 
@@ -20,7 +20,7 @@ struct Local {
     only: Option<Arc<Passage>>,
 }
 
-/// When a run is where.
+/// Time and chainage of a run's samples.
 #[derive(Debug)]
 struct Passage {
     file: String,

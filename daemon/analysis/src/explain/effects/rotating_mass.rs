@@ -1,5 +1,5 @@
-//! Another rotating mass than declared: inertial mass = mass (1 + gamma). Unlike the mass it does
-//! not feel the gradient.
+//! Another rotating mass than declared: inertial mass = mass (1 + gamma). Unlike the mass, it does not change the force
+//! of a gradient.
 
 use dynocar_model::terms::rotating;
 use dynocar_shared::vocabulary::EffectKind;
