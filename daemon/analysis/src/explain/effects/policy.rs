@@ -55,7 +55,7 @@ pub struct Policy {
     /// Whether a wrong gradient or wheel leaves such a force where pieces of the line end, so that a place that was
     /// chosen is not certain beside these.
     pub is_left_by_moved_places: bool,
-    /// Whether it is sought with the usual errors in the model: it acts on the train by one law wherever that is.
+    /// Whether it is sought with the usual errors in the model: it acts on the train by one law at every place.
     pub is_sought_beside_usual_errors: bool,
     /// The kind as a small error that every railway has; `None` if it is no such error.
     pub everyday: Option<Everyday>,
