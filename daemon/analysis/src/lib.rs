@@ -12,7 +12,7 @@
 //! - [`identify`]: the daemon's pipelines over recorded runs
 //! - [`survey`]: a line and its gradient from recordings with GNSS
 //! - [`stops`]: a brake of unknown force, from recorded stops
-//! - [`brakes`]: the same brake as train protection asks for it
+//! - [`brakes`]: the same brake in the form that train protection requires
 //! - [`explain`]: the undeclared effect that explains the residual of the declared model
 //! - [`driven`]: the train itself, force in and speed out, by the law that `explain` predicts with
 //! - [`advice`]: the next manoeuvre, which narrows the estimates

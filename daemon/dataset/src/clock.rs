@@ -20,7 +20,7 @@ const UNIX_DAY: i64 = 2_440_588;
 pub enum TimeFormat {
     /// `2026-03-18T07:13:20.2` of ISO 8601, or with a space in place of the T.
     Iso,
-    /// `07:13:20.2`, which begins anew at midnight.
+    /// `07:13:20.2`, which begins again at midnight.
     Clock,
     /// `0 days 07:13:20.2`, or `31:13:20.2`: the time since a start.
     Elapsed,

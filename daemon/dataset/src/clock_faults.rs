@@ -1,5 +1,5 @@
 //! Faults in the times of whole rows by recorders and tools: seconds without a fraction, an hour of summer time,
-//! rows in another order; and times that begin anew.
+//! rows in another order; and times that begin again.
 
 use super::order::quantile;
 
@@ -27,7 +27,7 @@ pub(super) struct ClockFaults {
     pub shared: Option<usize>,
     /// True where rows stood in another order.
     pub sorted: bool,
-    /// Where times begin anew that overlap those before, and by how many s they fall.
+    /// Row where times begin again and overlap those before, and by how many s they fall.
     pub anew: Option<(usize, f64)>,
 }
 

@@ -24,7 +24,7 @@ pub struct FileKey {
 }
 
 impl FileKey {
-    /// `key = value`, as a file says it.
+    /// Returns `key = value`, as it stands in a file.
     pub fn assign(&self, value: impl Display) -> String {
         assign(self.name, value)
     }

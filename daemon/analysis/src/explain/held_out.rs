@@ -20,7 +20,8 @@ const DEVIATION_TIMES_MAX: f64 = 5.0;
 pub struct HeldOutRun {
     /// Errors without and with the effects.
     pub score: RunScore,
-    /// Its part of the evidence; `None` without effects, where it shows none, and where another run has it.
+    /// Its evidence on the effects; `None` without effects, where the run shows nothing of them, and where another run
+    /// has gathered it.
     evidence: Option<(RunNormal, Vec<RunPositions>)>,
 }
 

@@ -26,8 +26,7 @@ impl Common {
         self.0[3]
     }
 
-    /// Returns the seconds by which forces act before their stamp: the force at a time is the one stamped
-    /// so much later.
+    /// Returns the time in s by which forces act before their time stamps.
     pub fn delay_s(&self) -> f64 {
         self.0[4]
     }

@@ -13,7 +13,7 @@ pub struct Name {
     pub text: String,
     /// Its words in small letters, without the unit in brackets.
     pub words: Vec<String>,
-    /// The unit that the name gives in brackets or behind a stroke, as written.
+    /// The unit that the name gives in brackets or after a slash, as written.
     pub unit: Option<String>,
 }
 
@@ -21,7 +21,7 @@ impl Name {
     /// Divides a name: `F_trac [kN]` is f, trac and the unit kN.
     pub fn parse(text: &str) -> Self {
         let text = text.trim();
-        // Recorders of buses write the source behind a stroke: `speed\CAN1:1`.
+        // Recorders of buses write the source after a backslash: `speed\CAN1:1`.
         let is_source = |it: &str| it.contains(':') && it.ends_with(|it: char| it.is_ascii_digit());
         let own = text.rsplit_once('\\').filter(|it| is_source(it.1)).map_or(text, |it| it.0);
         let (rest, unit) = split_unit(own);

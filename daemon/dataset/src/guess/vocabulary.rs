@@ -11,13 +11,13 @@ use crate::Quantity;
 /// Weight of a term as evidence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TermWeight {
-    /// Says the quantity among other words too.
+    /// It names the quantity among other words too.
     Named,
-    /// Says it where nothing else of weight is said: `brake` may go on as `brake disc wear`.
+    /// It names the quantity unless another word has weight: `brake` may go on as `brake disc wear`.
     Alone,
     /// A letter of formulas or an abbreviation.
     Symbol,
-    /// May well be another thing's: a train has more pressures than one.
+    /// It may belong to another quantity: a train has several pressures.
     Weak,
 }
 

@@ -30,7 +30,7 @@ fn mean_degc(run: &RunData) -> Option<f64> {
 /// Each run has one temperature, and also its load and wind, which may follow the temperatures by chance.
 pub const POLICY: Policy = Policy { certainty: Certainty::BesideUsualErrors, ..Policy::USUAL };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     let means: Option<Vec<f64>> = scan.problem.runs.iter().map(mean_degc).collect();
     let Some(means) = means else {

@@ -18,7 +18,7 @@ struct Curves {
 /// It estimates a figure that is usually a little wrong.
 pub const POLICY: Policy = Policy { frees: &[DeclaredFigure::Curves], ..Policy::USUAL };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     let in_curve_s = scan
         .seconds_where(|_, sample| sample.curvature_per_m.is_some_and(|curvature| curvature > 0.0));

@@ -26,7 +26,7 @@ use crate::statistics::rms;
 
 /// Number of nodes in the length over which the error changes.
 const NODES_A_LENGTH: f64 = 3.0;
-/// Nodes at least, and at most.
+/// Least and greatest number of nodes.
 const NODES_MIN: f64 = 4.0;
 const NODES_MAX: f64 = 160.0;
 /// Least number of runs in which an effect tied to the line shows.
@@ -50,7 +50,7 @@ pub const POLICY: Policy = Policy {
     ..Policy::USUAL
 };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     let runs = &scan.problem.runs;
     let span_m = span_m(scan).filter(|_| scan.problem.positions.distance_ratio.is_some());

@@ -22,7 +22,7 @@ struct Shift {
 /// An error of the map: the usual errors already contain it.
 pub const POLICY: Policy = Policy { is_sought_beside_usual_errors: false, ..Policy::USUAL };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     let Some(hypothesis) = shift(scan) else {
         return Err("no gradient profile over the chainage".into());

@@ -56,7 +56,7 @@ pub const POLICY: Policy = Policy {
     ..Policy::USUAL
 };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     if scan.problem.positions.distance_ratio.is_none() {
         return Err("positions are not measured".into());

@@ -48,7 +48,7 @@ pub const POLICY: Policy = Policy {
     ..Policy::USUAL
 };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     let braking_s = scan.seconds_where(|_, sample| braking(sample) > 0.01);
     if braking_s < BRAKING_MIN_S {

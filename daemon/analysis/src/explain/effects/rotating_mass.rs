@@ -16,7 +16,7 @@ struct Gamma {
 /// It estimates a figure that is usually a little wrong.
 pub const POLICY: Policy = Policy { frees: &[DeclaredFigure::RotatingMass], ..Policy::USUAL };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     let declared = scan.train.rotating_mass_factor;
     Ok(vec![Candidate::new(Gamma { declared }, vec![declared])])

@@ -29,7 +29,7 @@ pub const POLICY: Policy = Policy {
     ..Policy::USUAL
 };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     if !scan.problem.runs.iter().any(|run| run.is_position_recorded) {
         return Err(

@@ -37,7 +37,7 @@ struct Tunnels {
 /// wheel or gradient looks like it.
 pub const POLICY: Policy = Policy { is_left_by_moved_places: true, ..Policy::USUAL };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     let length_m = scan.train.length_m;
     let Some(track) = scan.track else {

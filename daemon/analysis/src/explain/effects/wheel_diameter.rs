@@ -18,7 +18,7 @@ pub const POLICY: Policy = Policy {
     ..Policy::USUAL
 };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     if scan.problem.positions.distance_ratio.is_none() {
         return Err("no measured positions to compare the speed with".into());

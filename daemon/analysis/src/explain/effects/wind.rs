@@ -35,7 +35,7 @@ pub const POLICY: Policy = Policy {
     ..Policy::USUAL
 };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     let runs = &scan.problem.runs;
     if runs.iter().all(|run| run.direction == runs[0].direction) {

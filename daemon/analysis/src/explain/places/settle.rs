@@ -26,8 +26,8 @@ struct Belief {
     interval: [f64; 2],
 }
 
-/// Moves the ends of all places of a fit to the medians of their posteriors, fits again, and says
-/// for each effect how surely its place is known; `None` for one whose place was not estimated.
+/// Moves the ends of all places of a fit to the medians of their posteriors, fits again, and returns the uncertainty of
+/// each effect's place; `None` for an effect whose place was not estimated.
 pub fn settle(problem: &FitProblem, fit: &mut Fit) -> Vec<Option<PlaceUncertainty>> {
     let mut model = fit.model.clone();
     let mut known = Vec::new();

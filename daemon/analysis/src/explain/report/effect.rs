@@ -23,7 +23,7 @@ type Values = BTreeMap<String, ParameterValue>;
 /// Kind, size and place of an effect.
 pub fn described(effect: &EffectAnswer) -> String {
     let kind = match effect.kind {
-        // The sentence around it says that it has no name.
+        // The sentence around this text says that the effect has no name.
         "unknown" => "a residual",
         kind => kind_name(kind),
     };
