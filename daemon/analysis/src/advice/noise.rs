@@ -2,9 +2,9 @@
 //!
 //! A filter of [a, b, c, v] whose force is disturbed with the density d² (d in N/kN √s) gains information on a, for
 //! given b and c, at the rate 1 / d² while the train moves, at any speed and in any manoeuvre: every moment measures
-//! w0(v) = a + b v + c v² with the variance d² / dt, and the derivative of w0 by a is 1. The growth of the (a, a) entry
-//! of the information, the inverse of the published covariance, therefore gives d, including everything that widens the
-//! published covariance. The noise of the measured speed is the default of the pipeline.
+//! w0(v) = a + b v + c v² with the variance d² / dt, and the derivative of w0 by a is 1. The growth of the (a, a)
+//! entry of the information, the inverse of the published covariance, therefore gives d, including everything that
+//! widens the published covariance. The noise of the measured speed is the default of the pipeline.
 
 use dynocar_core::pipeline::train_kalman::{TrainKalmanSettings, declared_a_std};
 use dynocar_model::train::{Davis, TrainModel};

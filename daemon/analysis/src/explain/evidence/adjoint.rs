@@ -15,8 +15,8 @@ use super::whitener::{self, FADING, LEVEL};
 /// Adjoint filter of one run: it gives products of accelerations at the bins with the series of a fit.
 #[derive(Clone, Debug)]
 pub struct Adjoint {
-    /// Change by 1 m/s² at each bin of the weighted products with the innovations, the columns of the run's own factors
-    /// and the regressors that touch the run.
+    /// Change by 1 m/s² at each bin of the weighted products with the innovations, the columns of the run's own
+    /// factors and the regressors that touch the run.
     added: Vec<f64>,
     /// The numbers of these regressors.
     regressors: Vec<usize>,

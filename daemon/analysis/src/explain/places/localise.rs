@@ -170,8 +170,8 @@ pub fn find(scan: &Scan, shape: Shape, inside: Inside) -> Option<FoundIntervals>
     Some(found)
 }
 
-/// Returns the standard deviation in ‰ of the mean gradient over some intervals: the one that the line states for each,
-/// and no less than a surveyor's.
+/// Returns the standard deviation in ‰ of the mean gradient over some intervals: the one that the line states for
+/// each, and no less than a surveyor's.
 fn gradient_std_permille(track: Option<&Track>, intervals_m: &[[f64; 2]]) -> f64 {
     let squares: f64 = intervals_m
         .iter()
