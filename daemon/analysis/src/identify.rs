@@ -12,8 +12,8 @@ use dynocar_shared::{
 
 use crate::dataset::{Dataset, Run};
 
-/// Returns the samples of all runs, in file order, as a controller publishes them: numbered on without
-/// a gap, each run under a number of its own.
+/// Returns the samples of all runs, in file order, as a controller publishes them: with consecutive sequence numbers,
+/// each run under a number of its own.
 pub fn published_samples(dataset: &Dataset, train: TrainId) -> Vec<TrainSample> {
     samples_of_runs(&dataset.runs, train)
 }
@@ -49,8 +49,8 @@ pub fn snapshot_after(
     process(dataset, samples, settings, |_, _| {})
 }
 
-/// Runs one estimator with its settings over the samples; gives what recorded runs say: at their last stop another load
-/// may board, but their mass is the one that arrived.
+/// Runs one estimator with its settings over the samples and returns its last estimate. At the last stop another load
+/// may board, so that the estimator waits: then the estimate is that on arrival, which holds for the recorded runs.
 ///
 /// # Errors
 ///
@@ -144,7 +144,8 @@ pub fn recommended_estimators(dataset: &Dataset) -> Vec<EstimatorSettings> {
     kinds.into_iter().filter_map(EstimatorSettings::default_of).collect()
 }
 
-/// Brake coefficients need the pressure and what the gear makes of it; the others at most wait.
+/// Brake coefficients need the pressure and the force that the gear makes of it; without data, the other estimators
+/// only wait.
 fn is_permitted(quantity: Quantity, dataset: &Dataset) -> bool {
     let has_pressure = |run: &Run| {
         run.samples.iter().any(|it| it.get(SampleField::BrakeCylinderPressure).is_some())

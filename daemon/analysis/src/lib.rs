@@ -1,8 +1,9 @@
 //! Analysis of recorded runs.
 //!
-//! It knows no channel, clock, file, thread or logger: texts, times and seeds come in as
-//! arguments, and what does not depend on each other is said to whoever gives it threads (decision 0018). Laws, forces, simulation and estimators are [`dynocar_core`]'s, which knows nothing
-//! of this library: what is found in recordings is what the daemon then applies.
+//! Texts, times and seeds are arguments, and independent work is given to the caller's threads (decision 0018): the
+//! library knows no channel, clock, file, thread or logger. Laws, forces and simulation come from [`dynocar_model`],
+//! filters and pipelines from [`dynocar_core`], estimators from [`dynocar_estimators`]. None of these knows this
+//! library, and the daemon applies the effects that it finds in recordings.
 //!
 //! # Layout, in the order of the work
 //!
@@ -11,11 +12,11 @@
 //! - [`identify`]: the daemon's pipelines over recorded runs
 //! - [`survey`]: a line and its gradient from recordings with GNSS
 //! - [`stops`]: a brake of unknown force, from recorded stops
-//! - [`brakes`]: the same brake as train protection asks for it
+//! - [`brakes`]: the same brake in the form that train protection requires
 //! - [`explain`]: the undeclared effect that explains the residual of the declared model
 //! - [`driven`]: the train itself, force in and speed out, by the law that `explain` predicts with
-//! - [`advice`]: the next manoeuvre, by which the estimates become sharper
-//! - [`statistics`]: the middle of values, their root mean square, their span, lists in order
+//! - [`advice`]: the next manoeuvre, which narrows the estimates
+//! - [`statistics`]: medians, root mean squares and spans of values, and sorted lists
 //! - [`parallel`]: work on all threads
 
 pub mod advice;

@@ -1,7 +1,7 @@
-//! Work on all threads that the caller gives: results in the order of the items, the same on any number of threads
+//! Work on the caller's threads: the results are in the order of the items, and the same on any number of threads
 //! (decision 0018).
 //!
-//! The library that shares work is compiled once here, for a call through a pointer, not anew for each place of use.
+//! The code that hands out work is compiled once, for calls through a pointer, and not again for each use.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -12,8 +12,8 @@ pub fn of_each_number<R: Send>(count: usize, make: impl Fn(usize) -> R + Sync) -
     in_tasks(count, 1, make)
 }
 
-/// Returns the results of `make` for each number below a count, `at_least` of them in one task, since each alone is
-/// less work than handing it to a thread.
+/// Returns the results of `make` for each number below a count, `at_least` of them in one task, since one alone is less
+/// work than handing it to a thread.
 pub fn in_tasks<R: Send>(
     count: usize,
     at_least: usize,

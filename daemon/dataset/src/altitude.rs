@@ -1,14 +1,14 @@
 //! Gradient from the altitude along the line.
 
-/// Altitudes are averaged over intervals of this many m, so that a standing train does not
-/// outweigh a fast one.
+/// Length in m of the intervals over which altitudes are averaged, so that a standing train does not outweigh a fast
+/// one.
 const CELL_M: f64 = 10.0;
-/// The gradient at a place is fitted over this many m to either side: wide enough for altitudes in whole metres,
-/// which then leave an error of about 1 ‰, and not wider than gradients are long.
+/// Distance in m to either side over which the gradient at a place is fitted: wide enough for altitudes in whole
+/// metres, which then leave an error of about 1 ‰, and not wider than gradients are long.
 const HALF_WINDOW_M: f64 = 150.0;
-/// A fit over fewer m than this says nothing.
+/// Least distance in m that a fit covers.
 const SPAN_MIN_M: f64 = 100.0;
-/// Under a long train a fit whose altitudes lie more than this many m to one side is none of its place.
+/// Greatest distance in m between a place and the centre of the altitudes in its fit, under a long train.
 const ASIDE_MAX_M: f64 = 30.0;
 /// Least share of a long train that must stand on known ground.
 const KNOWN_MIN: f64 = 0.9;

@@ -18,8 +18,7 @@ const MISSING: &str = "n/a na n.a. n/d nd n.d. n.v. k.a. #n/a #na #n/v #nv #n/d 
                        * missing bad bad_input i/o_timeout error err fault fehler invalid inv ungültig no_data nodata \
                        undefined undef unknown unavailable overflow underflow void empty leer";
 
-/// Returns the number in a trimmed cell, `NaN` for an empty one and a word for what is missing; `None` when it is
-/// something else.
+/// Returns the number in a trimmed cell, `NaN` for an empty cell or a word for a missing value; `None` for other text.
 pub fn parse_cell(cell: &[u8], marks: Marks) -> Option<f64> {
     if cell.is_empty() {
         return Some(f64::NAN);
@@ -156,7 +155,7 @@ fn grouping(cell: &[u8], layout: &TextLayout) -> Option<String> {
         .map(|(mark, _)| mark.to_string())
 }
 
-/// Bytes as text, whatever they are.
+/// Returns bytes as text, with the invalid ones replaced.
 pub fn lossy(bytes: &[u8]) -> Cow<'_, str> {
     String::from_utf8_lossy(bytes)
 }

@@ -1,7 +1,7 @@
 //! Times as loggers write them: dates, and clock times that pass midnight.
 //!
-//! A run's times count from the midnight before its first row, so that they stay small numbers; the
-//! day itself is kept beside them. Local time without a zone counts as UTC.
+//! A run's times count from the midnight before its first row, so that they stay small numbers; the day is kept apart.
+//! Local time without a zone counts as UTC.
 
 use std::borrow::Cow;
 
@@ -15,12 +15,12 @@ const DAY_S: f64 = 86_400.0;
 /// 1970-01-01 as a Julian day.
 const UNIX_DAY: i64 = 2_440_588;
 
-/// How a column's times are written.
+/// Format of a column's times.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum TimeFormat {
     /// `2026-03-18T07:13:20.2` of ISO 8601, or with a space in place of the T.
     Iso,
-    /// `07:13:20.2`, which begins anew at midnight.
+    /// `07:13:20.2`, which begins again at midnight.
     Clock,
     /// `0 days 07:13:20.2`, or `31:13:20.2`: the time since a start.
     Elapsed,
@@ -28,7 +28,7 @@ pub enum TimeFormat {
     Pattern(String),
 }
 
-/// The formats that are looked for in cells that nobody described, the likeliest first.
+/// Formats that are tried on cells that nobody described, the likeliest first.
 const PATTERNS: [&str; 28] = [
     "%d.%m.%Y %H:%M:%S",
     "%-d.%-m.%Y %-H:%M:%S",
@@ -189,7 +189,7 @@ impl DayClock {
         self.first_day
     }
 
-    /// Returns a cell's time in s since the midnight before the first row; `None` for what is no such time.
+    /// Returns a cell's time in s since the midnight before the first row; `None` for a cell that is no such time.
     pub fn seconds(&mut self, cell: &[u8]) -> Option<f64> {
         let (day, of_day_s) = self.read(cell)?;
         let time_s = match day {
@@ -312,8 +312,8 @@ fn with_zeros(cell: &[u8]) -> Option<Vec<u8>> {
     Some([&b"000000"[..zeros], cell].concat())
 }
 
-/// Returns a fraction of a second behind a point, a comma, a stroke, or a colon before thousandths, or as further
-/// digits; 0 without; and what follows.
+/// Returns the fraction of a second that a point, a comma, an underscore, or a colon before thousandths begins, or that
+/// follows as further digits, 0 without one; and the text after it.
 fn fraction(text: &[u8]) -> Option<(f64, &[u8])> {
     let thousandths = text.strip_prefix(b":").filter(|it| it.len() >= 3);
     let more = Some(text).filter(|it| it.first().is_some_and(u8::is_ascii_digit));

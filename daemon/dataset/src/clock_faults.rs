@@ -1,21 +1,21 @@
 //! Faults in the times of whole rows by recorders and tools: seconds without a fraction, an hour of summer time,
-//! rows in another order; and times that begin anew.
+//! rows in another order; and times that begin again.
 
 use super::order::quantile;
 
 /// An hour, by which clocks are put forward and back.
 const HOUR_S: f64 = 3600.0;
-/// A train that goes on changes its speed by no more m/s over a step, besides what it accelerates.
+/// Greatest change in m/s of a moving train's speed over a step, in addition to that by its acceleration.
 const SPEED_STEP_MPS: f64 = 1.0;
-/// The sharpest acceleration in m/s².
+/// Sharpest acceleration in m/s².
 const ACCELERATION_MPS2: f64 = 3.0;
-/// Share of rows with the time of the row before from which times have no fraction.
+/// Share of rows with the time of the row before above which times have no fraction.
 const REPEATED_SHARE: f64 = 0.4;
-/// Share of rows out of order from which it is no disorder of single rows.
+/// Share of rows out of order above which the whole file is in another order.
 const DISORDER_SHARE: f64 = 0.05;
-/// Rows in a part that was recorded as one, at least.
+/// Least number of rows in a part that was recorded as one.
 const PART_ROWS: usize = 50;
-/// Epochs of times in s beyond this are none of a clock that counts from 1970.
+/// Time in s above which a clock does not count from 1970.
 const FAR_S: f64 = 9.2e9;
 
 /// Repairs of the times of a run, each with the row.
@@ -27,14 +27,14 @@ pub(super) struct ClockFaults {
     pub shared: Option<usize>,
     /// True where rows stood in another order.
     pub sorted: bool,
-    /// Where times begin anew that overlap those before, and by how many s they fall.
+    /// Row where times begin again and overlap those before, and by how many s they fall.
     pub anew: Option<(usize, f64)>,
 }
 
-/// Sets the times of a run right where what happened to them is plain. Gives what was done, and the order of the rows where
+/// Corrects the times of a run where their fault is evident. Returns the corrections, and the order of the rows where
 /// they stood in another.
 ///
-/// `is_repeated` says of a row whether it repeats the one before in all but the time.
+/// `is_repeated` returns whether a row repeats the row before in all but the time.
 pub(super) fn mend(
     times_s: &mut [f64],
     speed_mps: &[f64],

@@ -1,4 +1,4 @@
-//! `[corrections]` and `[[extra]]` of a `train.toml`: additions of measured runs to the declared model.
+//! `[corrections]` and `[[extra]]` of a `train.toml`: additions to the declared model by measured runs.
 
 use dynocar_model::terms::extra::{Covariate, CovariateFactor, ExtraResistance, FACTORS_MAX, Form};
 
@@ -8,7 +8,7 @@ use super::keys::extra::{FACTORS, FORCE};
 use super::keys::factor::{FORM, OF};
 use super::keys::{self, extra};
 
-/// Reads the tables of a train file; none where none stand there.
+/// Reads the tables of a train file; the list is empty where there are no tables.
 pub(super) fn read_extra(root: &Item) -> Result<Vec<ExtraResistance>, DatasetError> {
     root.tables(extra::TABLE)?.iter().map(extra_of).collect()
 }

@@ -14,7 +14,7 @@ use super::quantity::Quantity;
 use super::resolved::Resolved;
 use super::unusual_resistance::unusual_resistance;
 
-/// Masses per metre of train in t/m: from a light rail car to a loaded ore train, with room.
+/// Masses per metre of train in t/m: from a light rail car to a loaded ore train, with a margin.
 const MASS_PER_LENGTH_T_PER_M: (f64, f64) = (0.1, 20.0);
 /// Lengths in m of a vehicle or a train; 1 m stands for a train taken as a point.
 const LENGTH_M: (f64, f64) = (1.0, 8000.0);

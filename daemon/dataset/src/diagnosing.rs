@@ -1,4 +1,4 @@
-//! Finds the diagnostics of a run.
+//! Search for the diagnostics of a run.
 
 use dynocar_core::plausibility::Severity::{Fundamental, Info, Warning};
 use dynocar_core::plausibility::{DetectedFault, DetectedFaults, InputFault};
@@ -15,15 +15,15 @@ use super::quantity::Quantity;
 use super::resolved::{Context, GradientSource, Resolved};
 use super::speed_and_position::PositionSource;
 
-/// Below this distance in m, comparisons of position and speed say nothing.
+/// Distance in m below which comparisons of position and speed say nothing.
 const DISTANCE_MIN_M: f64 = 200.0;
-/// Rows at either end that show where a run begins and ends.
+/// Number of rows at either end that show where a run begins and ends.
 const END_ROWS: usize = 5;
-/// Position and integrated speed may differ by this share: wheel wear, balises, gaps.
+/// Greatest relative difference between position and integrated speed, by wheel wear, balises and gaps.
 const DISTANCE_TOLERANCE: f64 = 0.05;
-/// So far in m off the line's ends a train's end may be.
+/// Distance in m beyond the line's ends within which a train's end may be.
 const LINE_TOLERANCE_M: f64 = 50.0;
-/// Median time steps in s of recordings that make sense.
+/// Usual median time steps in s of recordings.
 const USUAL_STEP_S: (f64, f64) = (0.0005, 60.0);
 
 /// A moving train's columns that all keep their values for this many s are diagnosed.
@@ -41,7 +41,7 @@ fn of_count(rows: usize) -> (&'static str, Value) {
     ("count", Value::Integer(rows as i64))
 }
 
-/// Looks for what may be wrong with a run.
+/// Returns the diagnostics of the likely mistakes in a run.
 pub(super) fn diagnostics(
     context: Context,
     run: &Resolved,

@@ -1,4 +1,5 @@
-//! Diagnostics of a run: likely mistakes, or facts to know before its results are believed, in its unit.
+//! Diagnostics of a run: likely mistakes, or facts to know before its results are believed, in the units of its
+//! columns.
 
 use dynocar_core::plausibility::{DetectedFault, InputFault, Severity};
 use dynocar_model::units::Unit;
@@ -8,7 +9,7 @@ use toml::Value;
 use super::manifest::Manifest;
 use super::quantity::Quantity;
 
-/// A diagnostic on a run, or on what is declared of a train and its line.
+/// A diagnostic on a run, or on the declaration of a train and its line.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{text}")]
 pub struct Diagnostic {
@@ -20,8 +21,8 @@ pub struct Diagnostic {
     pub text: String,
     /// The figures, each with its name and unit.
     pub figures: Vec<(&'static str, Value)>,
-    /// Of samples that cannot be true (a wrong unit, an exchange, a wrong sign): what it is, and the unit that
-    /// the quantity was read in.
+    /// For samples that cannot be true (a wrong unit, an exchange, a wrong sign): the fault, and the unit in which the
+    /// quantity was read.
     pub fault: Option<(DetectedFault, Unit)>,
 }
 

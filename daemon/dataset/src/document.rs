@@ -1,4 +1,4 @@
-//! Expectations of a value of a document.
+//! Values of a document, checked against the expectations of their readers.
 
 use std::ops::{Bound, RangeBounds};
 
@@ -20,7 +20,7 @@ pub fn top_keys(label: &str, text: &str) -> Result<Vec<String>, DatasetError> {
     Ok(Item::root(label, &root).keys().map(Into::into).collect())
 }
 
-/// Above 0, up to a bound.
+/// Returns the range above 0 up to a bound.
 pub fn above_zero(most: f64) -> (Bound<f64>, Bound<f64>) {
     (Bound::Excluded(0.0), Bound::Included(most))
 }

@@ -24,7 +24,7 @@ impl SourcePosition {
         SourcePosition { file: file.into(), line: None }
     }
 
-    /// Returns a problem at this place: the expected value, and what came.
+    /// Returns a problem at this place: the expected value and the found one.
     pub fn problem(self, words: impl Display) -> DatasetError {
         DatasetError { place: self, words: words.to_string() }
     }
@@ -146,7 +146,8 @@ pub fn nearest<'n>(word: &str, all: &'n [String]) -> Option<&'n str> {
     only.map(|index| all[index].as_str())
 }
 
-/// Case and what separates words do not distinguish names for the purpose of a guess.
+/// Returns a name in small letters with one mark between words, since names that differ only there are alike for a
+/// guess.
 fn folded(name: &str) -> String {
     // A word of any length may come from a file; a name's first letters are enough for a guess.
     let letters = name.chars().take(80).flat_map(char::to_lowercase);

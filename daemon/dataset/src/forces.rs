@@ -1,5 +1,5 @@
-//! Traction and brake force of a run's rows, the electric power that the first may come from, and forces that act before
-//! their stamps, since some recorders average over the time before the stamp.
+//! Traction and brake force of a run's rows, the electric power that the traction force may come from, and forces that
+//! act before their time stamps, since some recorders average over the time before the stamp.
 
 use std::borrow::Cow;
 
@@ -11,15 +11,15 @@ use super::quantity::Quantity;
 use super::spikes::spikes;
 use super::table::Table;
 
-/// A force below zero by no more than this share of the greatest force is noise around zero.
+/// Share of the greatest force by which a force may lie below zero as noise.
 const NOISE_SHARE: f64 = 0.02;
-/// A difference from the neighbours by less than this share of the greatest force is no spike.
+/// Share of the greatest force below which a difference from the neighbours is no spike.
 const SPIKE_SHARE: f64 = 0.3;
-/// Rows further apart than this many s cannot distinguish a spike from a short application.
+/// Step in s between rows above which they cannot distinguish a spike from a short application.
 const SPIKE_STEP_MAX_S: f64 = 0.5;
-/// A handle outside 0 to 1 by no more than this is noise around the stop.
+/// Greatest distance of a handle beyond 0 or 1 that is noise around the stop.
 const HANDLE_NOISE: f64 = 0.02;
-/// The greatest force of a run is its quantile at this share, so that spikes do not set it.
+/// Quantile that counts as the greatest force of a run, so that spikes do not set it.
 const GREATEST_QUANTILE: f64 = 0.99;
 
 /// Where a run's force comes from.
@@ -71,10 +71,9 @@ pub(super) struct Forces {
 impl Forces {
     /// From the columns; handles need the speeds.
     ///
-    /// A force slightly below zero is noise around zero. It is counted as the other force, so
-    /// that traction minus brake stays what was measured: setting it to zero would let half of
-    /// the noise pass and bias every coasting. Where the other force is missing, it is set to
-    /// zero.
+    /// A force slightly below zero is noise around zero. It is counted as the other force, so that traction minus brake
+    /// stays as measured: setting it to zero would let half of the noise pass and bias every coasting. Where the other
+    /// force is missing, it is set to zero.
     pub fn new(table: &Table, speed_mps: &[f64], train: &TrainModel, order: &TimeOrder) -> Self {
         let (mut traction, mut brake) = match table.column(Quantity::ControlForce) {
             Some(control) => split(control, ForceSource::ControlForce),
@@ -191,8 +190,8 @@ fn split(control: &[f64], source: ForceSource) -> (Force, Force) {
     (part(1.0), part(-1.0))
 }
 
-/// Adds what the friction brake makes of its pressure to the recorded brake force; where no brake
-/// force is recorded, it is all there is. A missing pressure leaves the brake force unknown.
+/// Adds the force that the friction brake makes of its pressure to the recorded brake force, or to zero where no brake
+/// force is recorded. A missing pressure leaves the brake force unknown.
 fn add_friction(brake: &mut Force, pressure_pa: Option<&[f64]>, train: &TrainModel) {
     let (Some(pressure_pa), Some(friction)) = (pressure_pa, train.brake_gear.friction_brake) else {
         return;
@@ -226,8 +225,8 @@ fn hand_over(force_n: f64, noise_n: f64, row: usize, from: &mut Force, to: &mut 
     }
 }
 
-/// Returns a run's power in W, row by row, `NaN` where missing, what is fed back negative: the drive's own
-/// power, else the line's.
+/// Returns a run's power in W, row by row, `NaN` where missing and negative where regenerated: the drive's own power,
+/// else the line's.
 pub(super) fn recorded_w(table: &Table) -> Option<Cow<'_, [f64]>> {
     table.filled(Quantity::TractionPower).map(Cow::from).or_else(|| line_power_w(table))
 }
@@ -252,7 +251,7 @@ pub fn is_stamped_late(late_s: f64, std_s: f64) -> bool {
     late_s > LATE_MIN.0 && late_s > LATE_MIN.1 * std_s
 }
 
-/// Returns the force at a stamp by forces that are stamped `late_s` late: what stands `late_s` further on a
+/// Returns the force that acts at a stamp, where forces are stamped `late_s` late: the value `late_s` later on a
 /// straight line to the next sample, `step_s` ahead.
 #[inline]
 pub fn stamped_late(here: f64, ahead: f64, step_s: f64, late_s: f64) -> f64 {

@@ -1,6 +1,5 @@
-//! Keys of `train.toml`, `track.toml` and `dataset.toml`: one row each, by which every reader and writer of the files
-//! knows it. The numbers of `train.toml` have their rows where the train has its members
-//! ([`NUMBERS`]).
+//! Keys of `train.toml`, `track.toml` and `dataset.toml`: one row each, which every reader and writer of the files
+//! uses. The numbers of `train.toml` have their rows next to the members of the train ([`NUMBERS`]).
 
 use std::fmt::Display;
 
@@ -20,12 +19,12 @@ pub struct FileKey {
     pub table: &'static str,
     /// Its name there.
     pub name: &'static str,
-    /// Values that it may have: of a number the range, of anything else the words.
+    /// Values that it may have: the range of a number, the words of anything else.
     pub rule: NumberRule,
 }
 
 impl FileKey {
-    /// `key = value`, as a file says it.
+    /// Returns `key = value`, as it stands in a file.
     pub fn assign(&self, value: impl Display) -> String {
         assign(self.name, value)
     }
@@ -77,7 +76,7 @@ impl FileKey {
         section.entries(self.name, self.rule.allowed)
     }
 
-    /// Returns the error of a value that is not what the row says.
+    /// Returns the error of a value that the row does not allow.
     pub fn refused(&self, section: &Item, found: impl Display) -> DatasetError {
         section.key_out_of_range(self.name, &found.to_string(), self.rule.allowed)
     }

@@ -1,29 +1,28 @@
 //! Recorded runs of one train on one line, read from texts.
 //!
-//! A dataset is a folder with a `dataset.toml` that says which columns of the runs' CSV files
-//! hold which quantities in which units, a `train.toml` and, where the line is known, a
-//! `track.toml`. Everything particular to the files ends here: what comes out are the very
-//! [`TrainSample`](dynocar_shared::TrainSample)s that a controller would publish, in SI units,
-//! and an account of the data's quality.
+//! A dataset is a folder with a `dataset.toml`, which states the quantities and units of the columns in the runs' CSV
+//! files, a `train.toml` and, where the line is known, a `track.toml`. Everything particular to the files ends here:
+//! the library returns the same [`TrainSample`](dynocar_shared::TrainSample)s that a controller would publish, in SI
+//! units, and an account of the data's quality.
 //!
 //! The texts come in through [`DatasetFiles`]; this library opens no file.
 //!
 //! # Layout, in the order of reading
 //!
-//! - [`node`], [`document`], `names`, [`error`]: keys and values with their lines; mistakes with their choices
+//! - [`node`], [`document`], `names`, [`error`]: keys and values with their lines; errors with the allowed values
 //! - [`keys`]: every key of the three TOML files, for readers and writers
 //! - [`manifest`], [`train_file`], [`track_file`]: the three TOML files
 //! - [`quantity`]: quantities of columns, in their [`units`](dynocar_model::units)
-//! - [`text_layout`], [`clock`]: how text falls into cells, and times that are no numbers
+//! - [`text_layout`], [`clock`]: the division of text into cells, and times that are no numbers
 //! - `run_content`: contents of a run's file, text or columns
 //! - `lines`, `header`, `cell`, `table`: a CSV file as columns of numbers
 //! - [`trains`]: files that hold several trains
-//! - `clock_faults`: an hour of summer time, seconds without a fraction, rows in another order
+//! - `clock_faults`: times with an hour of summer time, seconds without a fraction, rows in another order
 //! - `order`, `spikes`, `motion`, `forces`, `altitude`: from columns to time, speed,
 //!   position, forces and gradient
 //! - `resolved`, [`run`], [`quality`], [`diagnostic`], [`dataset_diagnostic`], `diagnosing`, `declared`: samples,
 //!   counts and warnings
-//! - [`written`]: the three TOML files as they are written, and declared ones that change
+//! - [`written`]: writers of the three TOML files, and of changes in declared ones
 //! - [`guess`]: a description of files that nobody has described yet
 
 mod altitude;
@@ -225,7 +224,7 @@ impl DatasetHead {
     ///
     /// The first mistake in one of their files, with line and column.
     pub fn read(self, files: &(impl DatasetFiles + ?Sized)) -> Result<Dataset, DatasetError> {
-        // The first mistake is that of the first run, whichever was read first.
+        // The first mistake is that of the first run in the manifest, in any order of reading.
         let runs = self.read_each(files).into_iter().collect::<Result<_, _>>()?;
         let Manifest { name, description, .. } = self.manifest;
         Ok(Dataset { name, description, train: self.train, track: self.track, runs })

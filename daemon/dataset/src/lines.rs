@@ -1,4 +1,4 @@
-//! The lines of a CSV file, those above the names and the rows, and numbers as most recorders write them.
+//! Lines of a CSV file, those above the names and the rows; numbers as most recorders write them.
 
 use std::borrow::Cow;
 
@@ -13,7 +13,7 @@ use super::text_layout::TextLayout;
 pub struct Cell<'t> {
     /// Text of the cell, without quotes around it.
     pub text: Cow<'t, [u8]>,
-    /// The number that it is, where that is written plainly.
+    /// Its number, if it is written plainly.
     pub plain: Option<f64>,
 }
 
@@ -35,8 +35,8 @@ impl CellRow<'_> {
 
 /// Reads the rows of a text, one after the other.
 ///
-/// A line ends with `\n`, `\r` or both. Within quotes all marks are text, and two quotes stand for one; what
-/// follows the closing quote belongs to the cell, too.
+/// A line ends with `\n`, `\r` or both. Within quotes all marks are text, and two quotes stand for one; text after the
+/// closing quote belongs to the cell, too.
 #[derive(Clone, Debug)]
 pub struct RowReader<'t> {
     /// Text that is not read yet.
@@ -212,8 +212,7 @@ pub fn names_of(row: &CellRow) -> Vec<String> {
     row.cells.iter().map(|cell| lossy(&cell.text).trim().to_owned()).collect()
 }
 
-/// Returns the indices of every mapping's columns among the names of a text that is laid out so; or what is wrong with
-/// the names.
+/// Returns the indices of every mapping's columns among the names of a text in this layout; or the error in the names.
 pub fn find_columns(
     header: &[String],
     text: &str,

@@ -1,4 +1,4 @@
-//! `dataset.toml`.
+//! Reader of `dataset.toml`.
 
 use std::path::{Component, Path};
 
@@ -19,7 +19,7 @@ use super::text_layout::TextLayout;
 use super::text_layout::TrainRows;
 
 named! {
-    /// Which point of the train the recorded position is of.
+    /// Point of the train to which recorded positions refer.
     PositionReference ("in a dataset") {
         /// The train's centre.
         Centre "centre";
@@ -156,7 +156,7 @@ impl Manifest {
     ///
     /// # Errors
     ///
-    /// Names file, line, key, value and what was allowed. Unknown keys are refused.
+    /// Names file, line, key, value and the allowed values. Unknown keys are refused.
     pub fn parse(label: &str, text: &str) -> Result<Self, DatasetError> {
         let document = Node::of_toml(label, text)?;
         let root = Item::root(label, &document);

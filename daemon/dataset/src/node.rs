@@ -1,4 +1,4 @@
-//! Keys and values that people and programs write, as a tree whose every value knows its line. TOML is read here;
+//! Keys and values that people and programs write, as a tree in which every value knows its line. TOML is read here;
 //! other languages make the same tree.
 
 use std::cell::Cell;

@@ -1,15 +1,15 @@
-//! The rows' order in time: rows out of order, repeated or missing.
+//! Order of the rows in time: rows out of order, repeated or missing.
 
 use dynocar_core::pipeline::admission::limits::TIME_STEP;
 use serde::Serialize;
 
-/// A step ahead in time of more than this many s is a clock set, not a gap in the rows.
+/// Step ahead in time in s above which the clock was set, and no rows are missing.
 const CLOCK_JUMP_S: f64 = TIME_STEP.high;
-/// A step longer than this many medians is a gap.
+/// Step in medians above which rows are missing.
 const GAP_STEPS: f64 = 1.5;
-/// In rows without a regular step, a step longer than this many medians is a gap.
+/// The same for rows without a regular step.
 const IRREGULAR_GAP_STEPS: f64 = 5.0;
-/// Share of steps within a quarter of the median that makes the rows regular.
+/// Least share of steps within a quarter of the median in regular rows.
 const REGULAR_SHARE: f64 = 0.8;
 
 /// The rows of a run in time.
@@ -24,7 +24,7 @@ pub(super) struct TimeOrder {
     pub counts: OrderCounts,
 }
 
-/// How regular the rows of a run are in time.
+/// Regularity of a run's rows in time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct OrderCounts {
     /// Median time step in s; 0 with fewer than two rows in order.
@@ -130,8 +130,8 @@ impl OrderCounts {
     }
 }
 
-/// Marks a longest selection of strictly increasing values; of several the one that takes the
-/// earliest rows, since those are what a reader from the top would keep.
+/// Marks a longest selection of strictly increasing values. Of several it marks the one with the earliest rows, which a
+/// reader from the top would keep.
 ///
 /// Patience sorting (Fredman 1975) from the end, n log n; one pass when all increase.
 pub(super) fn longest_increasing(values: &[f64]) -> Vec<bool> {

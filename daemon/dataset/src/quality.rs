@@ -1,4 +1,5 @@
-//! Quality of a run's data: counts, ranges, the train's motion, and the judgement of the admission that judges samples live.
+//! Quality of a run's data: counts, ranges, the train's motion, and the refusals by the admission that also checks live
+//! samples.
 
 use dynocar_core::pipeline::admission::Admission;
 use dynocar_core::pipeline::{Echo, Outcome};
@@ -16,7 +17,7 @@ use super::quantity::Quantity;
 use super::resolved::{Context, DATASET_TRAIN, Resolved};
 use super::table::LineCounts;
 
-/// A force below this share of the greatest one counts as none.
+/// Share of the greatest force below which a force counts as zero.
 const COASTING_SHARE: f64 = 0.005;
 
 /// Quality of a run's data.
@@ -98,7 +99,7 @@ pub struct MeanAndRange {
     pub high: f64,
 }
 
-/// For how many s the train did what.
+/// Time in s that the train spent in each phase.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Phases {
     /// Speed below 0.1 m/s.
@@ -114,7 +115,7 @@ pub struct Phases {
 }
 
 impl RunQuality {
-    /// Returns the samples that validation refuses, whatever the reason.
+    /// Returns the number of samples that validation refuses, for all reasons together.
     pub fn refused_in_all(&self) -> usize {
         self.refused.iter().map(|refused| refused.count).sum()
     }
@@ -224,7 +225,7 @@ fn distance_m(run: &Resolved) -> f64 {
         .sum()
 }
 
-/// Each step counts for what the row at its start says.
+/// Returns the times of the phases; each step counts for the phase of the row at its start.
 fn phases(run: &Resolved) -> Phases {
     let mut phases = Phases::default();
     let least_n = COASTING_SHARE * run.forces.greatest_n;
@@ -288,7 +289,8 @@ impl Judge {
         }
     }
 
-    /// Returns the impossibilities of the samples: those that a pipeline would see, else what the run as a whole shows.
+    /// Returns the impossibilities of the samples: those that a pipeline would see, else those that only the run as a
+    /// whole shows.
     pub fn detected(&self) -> DetectedFaults {
         let live = self.admission.detected();
         if live.is_empty() {

@@ -1,12 +1,12 @@
-//! The canonical quantities of a dataset.
+//! Quantities of a dataset.
 
 use dynocar_model::named;
 use dynocar_model::units::{Dimension, Unit};
 use dynocar_shared::SampleField;
 use serde::Serialize;
 
-/// Declares the quantities: what each is, its name in a dataset, what its units measure, and the field of a sample
-/// that it fills, if any.
+/// Declares the quantities: the description of each, its name in a dataset, the dimension of its units, and the field
+/// of a sample that it fills, if any.
 macro_rules! quantities {
     ($( #[doc = $doc:literal] $item:ident $name:literal $dimension:ident $(=> $field:ident)?; )*) => {
         named! {

@@ -1,4 +1,4 @@
-//! Columns of a run in SI units, whatever the layout of its file, and the samples made of them.
+//! Columns of a run in SI units, for any layout of its file, and the samples made of them.
 
 use std::sync::Arc;
 
@@ -173,7 +173,8 @@ fn drop_timeless(table: &mut Table) -> (Vec<u64>, usize) {
     (before, total)
 }
 
-/// Sets times right, and the rows into their order; what went before a row is known of the first only then.
+/// Corrects times, and puts the rows into their order. If the order changes, the rows without a time before each row
+/// are no longer known.
 fn mend_times(table: &mut Table, timeless_before: &mut [u64]) -> ClockFaults {
     let column = |quantity| table.column(quantity).unwrap_or_default();
     let (mut times_s, speed_mps) = (column(Quantity::Time).to_vec(), column(Quantity::Speed));
@@ -195,8 +196,8 @@ fn mend_times(table: &mut Table, timeless_before: &mut [u64]) -> ClockFaults {
 
 /// Returns the gradient that the samples carry, and where the gradient comes from first.
 ///
-/// A mapped `gradient` goes into the samples whatever the line's file says, since it counts
-/// where the position is missing.
+/// A mapped `gradient` goes into the samples even if the line's file has gradients, since it counts where the position
+/// is missing.
 fn gradient(
     (track, placement): (Option<&Track>, Placement),
     table: &Table,

@@ -26,8 +26,8 @@ use super::trains::{TrainsColumn, keep_only, only};
 
 const DAY_S: i64 = 86_400;
 
-/// Quantities that a sample does not carry and a run keeps besides, with name and unit. Power from the line is by its
-/// own column, or by voltage and current.
+/// Quantities that a sample does not carry and a run keeps in addition, with name and unit. The power from the line
+/// comes from its own column, or from voltage and current.
 pub const EXTRAS: [(Quantity, &str); 11] = [
     (Quantity::RelativeHumidity, "relative_humidity"),
     (Quantity::WindSpeed, "wind_speed_mps"),
@@ -90,8 +90,8 @@ pub struct Run {
 const FORCES: u16 = SampleField::TractionForce.bit() | SampleField::BrakeForce.bit();
 
 impl Run {
-    /// Returns the power in W that the traction force comes from, one value for each sample, and whether it
-    /// holds what is fed in addition to the drive; `None` where the force comes from elsewhere.
+    /// Returns the power in W that the traction force comes from, one value for each sample, and whether it includes
+    /// auxiliary power; `None` where the force comes from elsewhere.
     pub fn power(&self) -> Option<(&[Option<f64>], bool)> {
         if self.traction_source != ForceSource::Power {
             return None;
@@ -103,7 +103,7 @@ impl Run {
         }
     }
 
-    /// Takes what was recorded at its samples out of it, with what is known of the run; that stays here alone.
+    /// Moves the samples and their extra quantities out of the run, and returns them with a copy of the rest.
     pub fn split_off_samples(&mut self) -> Run {
         let (samples, extras) = (take(&mut self.samples), take(&mut self.extras));
         Run { samples, extras, ..self.clone() }
@@ -188,7 +188,7 @@ impl Run {
     }
 }
 
-/// Reads one run from what its file holds; `number` is its place in the manifest, from 1.
+/// Reads one run from its file's content; `number` is its place in the manifest, from 1.
 pub(super) fn read(
     context: Context,
     number: u32,

@@ -3,7 +3,7 @@
 /// Contents of a run's file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RunContent {
-    /// Rows of text, laid out as the manifest says.
+    /// Rows of text, in the layout of the manifest.
     Text(String),
     /// The columns of a file of Parquet.
     Columns(RunColumns),
@@ -12,9 +12,9 @@ pub enum RunContent {
 /// The columns of a run's file that is no text.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RunColumns {
-    /// All of them. Where a mapped one is not there, none has values.
+    /// All columns. Where a mapped one is missing, no column has values.
     pub columns: Vec<RunColumn>,
-    /// The one that says whose the rows are.
+    /// The column that names the train of each row.
     pub trains: Option<TrainColumn>,
 }
 
@@ -23,11 +23,11 @@ pub struct RunColumns {
 pub struct RunColumn {
     /// Its name.
     pub name: String,
-    /// A mapped column's numbers, times in the unit that is declared for them; `NaN` where missing.
+    /// The numbers of a mapped column, with times in their declared unit; `NaN` where missing.
     pub values: Option<Vec<f64>>,
 }
 
-/// The column of a run's file that says whose the rows are.
+/// The column of a run's file that names the train of each row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrainColumn {
     /// Its name.

@@ -6,11 +6,11 @@ use super::manifest::PositionReference;
 use super::order::TimeOrder;
 use super::spikes::spikes;
 
-/// A speed below zero by no more than this many m/s is the noise of a train that stands.
+/// Greatest speed in m/s below zero that is the noise of a standing train.
 const SPEED_NOISE_MPS: f64 = 0.2;
-/// A difference in m/s from the neighbours that is never a spike.
+/// Difference in m/s from the neighbours below which a speed is never a spike.
 const SPEED_SPIKE_LEAST_MPS: f64 = 0.3;
-/// The sharpest bend of a speed curve in m/s²; what is sharper may be a spike.
+/// Sharpest bend of a speed curve in m/s²; a sharper one may be a spike.
 const SPEED_BEND_MPS2: f64 = 1.5;
 
 /// Where the positions come from.

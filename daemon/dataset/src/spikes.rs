@@ -1,15 +1,14 @@
-//! Values that stick out from their neighbours.
+//! Outliers among neighbouring values.
 
-/// The spread of a run's values around their neighbours is this quantile of the differences:
-/// above the median, since a centre that is itself the median differs by nothing, and
-/// low enough for one value in ten, with its neighbours, to be an outlier.
+/// Quantile of the differences that counts as the spread of a run's values around their neighbours: above the median,
+/// since a centre that is itself the median does not differ, and low enough for one value in ten, with its neighbours,
+/// to be an outlier.
 const SPREAD_QUANTILE: f64 = 0.75;
-/// Number of spreads that make a spike; about eight standard deviations of white noise.
+/// Least size of a spike in spreads; about eight standard deviations of white noise.
 const SPIKE_SPREADS: f64 = 8.0;
 
-/// Marks values that stick out from the median of the `N` around them (Hampel's filter, with
-/// the spread taken over the whole run). `N` is odd: with 5, up to two rows in a row can be detected,
-/// with 3 a single one.
+/// Marks values that differ much from the median of the `N` around them (Hampel's filter, with the spread taken over
+/// the whole run). `N` is odd: with 5, up to two rows in a row can be detected, with 3 a single one.
 ///
 /// Only rows marked in `usable` and not `NaN` take part; the first and last few have too few
 /// neighbours to be detected. `least` is the difference below which nothing is a spike.

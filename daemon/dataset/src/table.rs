@@ -12,7 +12,7 @@ use super::quantity::Quantity;
 use super::run_content::RunColumn;
 use super::text_layout::TextLayout;
 
-/// Number of rows that show how many there will be.
+/// Number of rows from which the number of all rows is estimated.
 const ROWS_BEFORE_RESERVE: usize = 1000;
 
 /// The mapped columns of a run's file, each in its quantity's unit, `NaN` where missing.
@@ -234,8 +234,8 @@ impl Rows<'_> {
         let _ = self.line_of_row.try_reserve(rows);
     }
 
-    /// Returns true for a row in which words stand where values are expected and no value does: a footer, the names
-    /// again, what a power cut leaves.
+    /// Returns true for a row with words in the place of values and without any value: a footer, the names once more,
+    /// or the remains of a power cut.
     fn is_note(&self, row: &CellRow) -> bool {
         let mut cells = self.columns.iter().flat_map(|column| &column.indices);
         let first = cells.clone().next().map_or(&b""[..], |&index| row.trimmed(index));
@@ -268,7 +268,7 @@ impl Rows<'_> {
         Ok(())
     }
 
-    /// Takes in a row; what is wrong with it stays pending.
+    /// Adds a row; a fault in it stays pending.
     fn push(&mut self, row: &CellRow) -> Result<(), DatasetError> {
         let line = self.layout.skip_rows + row.line;
         let place = || SourcePosition::line(self.label, line);

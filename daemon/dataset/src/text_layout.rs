@@ -1,4 +1,4 @@
-//! Splitting the text of a dataset's runs into cells, and the encoding of a file.
+//! Division of the text of a dataset's runs into cells, and the encoding of a file.
 
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
@@ -14,12 +14,12 @@ use super::keys::train_file::ROWS;
 pub(crate) struct Marks {
     /// Before the fraction.
     pub decimal: u8,
-    /// Between groups of three digits; `None` where nothing is.
+    /// Between groups of three digits; `None` where there is no mark.
     pub thousands: Option<char>,
 }
 
 impl Marks {
-    /// Returns a point and nothing, or a comma and nothing.
+    /// Returns the decimal mark without a mark between groups.
     pub const fn plain(decimal: u8) -> Self {
         Marks { decimal, thousands: None }
     }
@@ -28,7 +28,7 @@ impl Marks {
 /// Possible separators of groups of three digits.
 pub const THOUSANDS: [char; 8] = ['.', ',', '\'', '’', ' ', '\u{a0}', '\u{202f}', '\u{2009}'];
 
-/// How the text of the runs' files falls into cells.
+/// How the text of the runs' files is divided into cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextLayout {
     /// Which letters the bytes are.
@@ -56,7 +56,7 @@ impl TextLayout {
         units_row: false,
     };
 
-    /// Reads the keys of `[dataset]`; what is left out is plain.
+    /// Reads the keys of `[dataset]`; a missing key has its plain value.
     pub(super) fn from_section(section: &Item) -> Result<Self, DatasetError> {
         let units_row = section.truth(UNITS_ROW.name)?.unwrap_or(false);
         let mut layout = TextLayout { units_row, ..Self::PLAIN };
@@ -103,7 +103,7 @@ impl TextLayout {
     }
 }
 
-/// Its value where all rows are of one train, whatever a column says.
+/// Value of the key where all rows are of one train, even if a column names several.
 const ALL: &str = "all";
 
 /// The rows of the runs' files that are the train's.
@@ -153,8 +153,8 @@ pub fn by_name(name: &str) -> Option<&'static Encoding> {
     Encoding::for_label_no_replacement(name.as_bytes())
 }
 
-/// Returns the encoding of bytes that nobody described: UTF-16 where they begin so, UTF-8 where they are such,
-/// else that of Western European Windows, unless they hold what no text does.
+/// Returns the encoding of bytes that nobody described: UTF-16 by its first bytes, UTF-8 where the bytes are valid,
+/// else that of Western European Windows, unless they hold bytes that no text has.
 pub fn guessed(bytes: &[u8]) -> &'static Encoding {
     match bytes {
         [0xff, 0xfe, ..] => UTF_16LE,
@@ -188,7 +188,7 @@ pub fn decoded(bytes: Vec<u8>, encoding: &'static Encoding) -> Result<String, Fi
     Err(FileProblem::OtherEncoding { line: line_of_first_loss(&text), expected: encoding.name() })
 }
 
-/// Returns the line, from 1, of the first letter that stands for what could not be read.
+/// Returns the line, from 1, of the first letter that replaces unreadable bytes.
 fn line_of_first_loss(text: &str) -> usize {
     let good = text.split('\u{fffd}').next().unwrap_or_default();
     1 + good.matches('\n').count()

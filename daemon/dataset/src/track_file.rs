@@ -1,4 +1,4 @@
-//! `track.toml`.
+//! Reader of `track.toml`.
 
 use dynocar_model::track::{
     GradientError, IntervalValue, LinearProfile, MassSection, ProfileError, StepProfile, Track,
@@ -16,18 +16,18 @@ use super::keys::track::{
 use super::keys::{FileKey, allow};
 use super::node::Node;
 
-/// A steeper gradient than any adhesion railway has is a mistake of unit.
+/// Range of gradients: a steeper one than on any adhesion railway is a mistake of the unit.
 const GRADIENTS: NumberRule = NumberRule::within(-150.0, 150.0, "from -150 to 150 permille");
 const GRADIENT_STDS: NumberRule = NumberRule::within(0.0, 150.0, "from 0 to 150 permille");
 const SPEEDS: NumberRule = NumberRule::above(0.0, 200.0, "a speed in m/s above 0, at most 200");
-/// How a line is called that nobody named.
+/// Name of a line that nobody named.
 const UNNAMED: &str = "unnamed line";
 
 /// Reads the text of a `track.toml`; `label` names the file in messages.
 ///
 /// # Errors
 ///
-/// Names file, line, key, value and what was allowed. Unknown keys are refused.
+/// Names file, line, key, value and the allowed values. Unknown keys are refused.
 pub fn parse_track(label: &str, text: &str) -> Result<Track, DatasetError> {
     let document = Node::of_toml(label, text)?;
     let root = Item::root(label, &document);
@@ -111,7 +111,7 @@ fn pairs<'t>(
     entries.collect::<Result<_, DatasetError>>().map(Some)
 }
 
-/// Adds what a survey knows besides the profile.
+/// Adds the results of a survey other than the profile.
 fn with_survey(mut track: Track, section: &Item) -> Result<Track, DatasetError> {
     type Wrap = fn(ProfileError) -> TrackError;
     let profile = |key: &FileKey, rule: &NumberRule, wrap: Wrap| {
@@ -138,7 +138,7 @@ fn with_survey(mut track: Track, section: &Item) -> Result<Track, DatasetError> 
     Ok(track)
 }
 
-/// Adds what measured runs have shown of the line: resistance at places, other masses in sections.
+/// Adds the corrections that measured runs have shown: resistance at places, other masses in sections.
 fn with_corrections(mut track: Track, section: &Item) -> Result<Track, DatasetError> {
     if let Some(shift_m) = GRADIENT_SHIFT.number(section)? {
         track.gradient_shift_m = shift_m;

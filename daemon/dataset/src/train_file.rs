@@ -1,4 +1,4 @@
-//! `train.toml`.
+//! Reader of `train.toml`.
 
 use dynocar_model::train::numbers::{BRAKE_UNITS, FORCE_PER_PRESSURE, FULL_MASS};
 use dynocar_model::train::{EffortCurve, NumberRule, TrainModel};
@@ -9,14 +9,14 @@ use super::error::DatasetError;
 use super::keys::{self, FileKey, TRAIN_TABLES};
 use super::node::Node;
 
-/// How a train is called that nobody named.
+/// Name of a train that nobody named.
 const UNNAMED: &str = "unnamed train";
 
 /// Reads the text of a `train.toml`; `label` names the file in messages.
 ///
 /// # Errors
 ///
-/// Names file, line, key, value and what was allowed. Unknown keys are refused.
+/// Names file, line, key, value and the allowed values. Unknown keys are refused.
 ///
 /// # Examples
 ///
@@ -82,7 +82,7 @@ fn read_numbers(
     Ok(())
 }
 
-/// Reads what is no single number of a brake, and requires what numbers need beside them.
+/// Reads the entries of a brake that are no single number, and requires the entries that its numbers need.
 fn read_brake(section: &Item, train: &mut TrainModel) -> Result<(), DatasetError> {
     let (most, curve) = (keys::brake::MAX_FORCE, keys::brake::EFFORT);
     let most_kn = most.number(section)?;

@@ -1,4 +1,4 @@
-//! Files that hold the rows of several trains: noticed, and those of one chosen.
+//! Files that hold the rows of several trains: their detection, and the choice of one train's rows.
 
 use std::borrow::Cow;
 
@@ -10,20 +10,20 @@ use super::run_content::TrainColumn;
 use super::table::Table;
 use super::text_layout::TextLayout;
 
-/// Names of columns that say whose the row is, in small letters and digits.
+/// Names of columns that name the train of a row, in small letters and digits.
 const NAMES: &str = "vehicle vehicleid vehid veh vehiclename vehicleno vehiclenumber train trainid trainno trainnr \
                      trainnumber trainname trainset unit unitid unitno unitnumber loco locoid locono locomotive \
                      locomotiveid locomotivenumber fahrzeug fahrzeugid fahrzeugnr fahrzeugnummer zug zugid zugnr \
                      zugnummer triebzug triebzugnr lok lokid loknr loknummer rame numerorame numerotrain tren treno \
                      idtren idtreno поезд номерпоезда";
-/// A position that changes by this many m and twice what the speed says is another train's.
+/// Change of a position in m, in addition to twice the distance by the speed, above which the row is another train's.
 const JUMP_MIN_M: f64 = 100.0;
-/// The line of the first row where the names stand in the first.
+/// Line of the first row if the names stand in the first line.
 const FIRST_ROW_LINE: usize = 2;
-/// Trains that a message names at most.
+/// Greatest number of trains that a message names.
 const SHOWN_MAX: usize = 8;
 
-/// Returns true for a column's name that says whose the rows are.
+/// Returns true for the name of a column that names the train of each row.
 pub fn names_trains(name: &str) -> bool {
     let letters = name.chars().filter(|letter| letter.is_alphanumeric());
     let folded: String = letters.flat_map(char::to_lowercase).collect();

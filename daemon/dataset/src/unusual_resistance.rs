@@ -2,7 +2,7 @@
 
 use dynocar_model::train::Davis;
 
-/// Basic resistances in N/kN that trains have at rest, and at their greatest speed; a declared 0 is none.
+/// Basic resistances in N/kN that trains have at rest, and at their greatest speed; a declared 0 does not count.
 const USUAL_AT_REST_N_PER_KN: (f64, f64) = (0.2, 15.0);
 const USUAL_AT_TOP_N_PER_KN: (f64, f64) = (0.5, 60.0);
 

@@ -1,5 +1,4 @@
-//! Writers of `train.toml`, `track.toml` and `dataset.toml`: texts that are made key by key, and declared files that
-//! change.
+//! Writers of `train.toml`, `track.toml` and `dataset.toml`: new texts, key by key, and changes in declared files.
 
 use std::fmt::{Display, Write as _};
 
@@ -85,7 +84,7 @@ impl TomlText {
     }
 }
 
-/// Returns true for an entry that the files may hold in addition to what they hold already.
+/// Returns true for an entry that the files may hold in addition to their present entries.
 pub fn can_hold(entry: &ModelEntry, train: &Table, track: &Table) -> bool {
     match entry {
         ModelEntry::Number(key, found) => key.rule.allows(joined(key, train, *found)),

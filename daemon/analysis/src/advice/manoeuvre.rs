@@ -1,22 +1,22 @@
-//! Manoeuvres that a train can be asked to drive on the level, within its limits.
+//! Manoeuvres on the level that a train can drive within its limits.
 
 use std::fmt;
 
 use dynocar_model::train::{Davis, TrainModel};
 
-/// Lowest speed in m/s that a manoeuvre begins at or ends above.
+/// Lowest speed in m/s at which a manoeuvre begins or ends.
 const SPEED_LOW_MPS: f64 = 2.0;
-/// Speeds that manoeuvres begin at, as shares of the highest.
+/// Speeds at which manoeuvres begin, as shares of the highest.
 const SPEED_SHARES: [f64; 5] = [0.3, 0.45, 0.6, 0.8, 1.0];
 /// Deceleration in m/s² of a service braking, where the train's brake gives it.
 const SERVICE_BRAKING_MPS2: f64 = 0.5;
-/// No train is asked for more, in m/s.
+/// Highest speed in m/s that a manoeuvre asks of any train.
 const SPEED_MAX_MPS: f64 = 125.0;
 
-/// The train as it is known now: what a manoeuvre is computed with.
+/// The train by the present estimates, with which a manoeuvre is computed.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene<'a> {
-    /// Declared train, above all the limits: effort curves and their highest speed.
+    /// The declared train, mainly for its limits: effort curves and their highest speed.
     pub train: &'a TrainModel,
     /// The resistance as estimated.
     pub davis: Davis,

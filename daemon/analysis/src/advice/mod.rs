@@ -1,9 +1,9 @@
-//! Advice on the next manoeuvre: the one that narrows most of the least known quantity.
+//! Advice on the next manoeuvre: the one that most narrows the least known quantity.
 //!
-//! Everything comes from a snapshot and the declaration of the train: the present covariance, the
-//! noise behind it ([`noise`]), the manoeuvres within the train's limits ([`manoeuvre`]), and what
-//! `train_kalman` would know after each ([`rehearsal`]). What driving does not help has its
-//! remedy in words ([`remedy`]). The line is taken as level: a snapshot does not say where the train is.
+//! Everything comes from a snapshot and the declaration of the train: the present covariance, the noise behind it
+//! ([`noise`]), the manoeuvres within the train's limits ([`manoeuvre`]), and the standard deviations that
+//! `train_kalman` would have after each ([`rehearsal`]). Where driving does not help, the advice is a remedy in words
+//! ([`remedy`]). The line is taken as level, since a snapshot does not state where the train is.
 
 pub mod manoeuvre;
 pub mod noise;
@@ -18,17 +18,18 @@ use manoeuvre::{DriveKind, Scene};
 use noise::{ANSWERED, RunNoise, davis_of};
 use rehearsal::{Forecast, KnownBefore, MASS, forecast};
 
-/// Times in s that a driver may be asked for, the shortest first.
+/// Durations in s of manoeuvres for a driver, the shortest first.
 pub const WITHIN_S: [f64; 3] = [20.0, 60.0, 180.0];
 /// The same for the mass: traction shows it soon or not at all.
 const MASS_WITHIN_S: [f64; 2] = [20.0, 60.0];
-/// A standard deviation of this share of the mass is good enough: load weighing is no better.
+/// Standard deviation, as a share of the mass, that is good enough: load weighing is no better.
 const MASS_GOOD_SHARE: f64 = 0.005;
-/// An interval of this share of the present one is worth asking for at once.
+/// Share of the present interval that makes a manoeuvre worth asking for at once.
 const GOOD_SHARE: f64 = 0.5;
-/// An interval beyond this share of the present one is not worth the driving.
+/// Share of the present interval above which a manoeuvre is not worth the driving.
 const WORTH_SHARE: f64 = 0.9;
-/// Coasting is advised where it is at most so much worse than the best: no error of a force is in it.
+/// Greatest interval after coasting, as a multiple of the best one, with which coasting is advised: it has no error of
+/// a force.
 const COASTING_SHARE: f64 = 1.05;
 
 /// A manoeuvre with its effect.

@@ -1,18 +1,17 @@
-//! Noise behind snapshots of the resistance, inferred from them.
+//! Noise behind snapshots of the resistance, estimated from these snapshots.
 //!
-//! A filter of [a, b, c, v] whose force is disturbed with the density d² (d in N/kN √s) gains
-//! information on a, for given b and c, at the rate 1 / d² while the train moves, whatever the speed and
-//! the manoeuvre: every moment measures w0(v) = a + b v + c v² with the variance d² / dt, and the derivative
-//! of w0 by a is 1. So the growth of the (a, a) entry of the information, the inverse of the
-//! published covariance, gives d, with all that widens the published covariance in it. The noise of
-//! the measured speed is the one that the pipeline begins with.
+//! A filter of [a, b, c, v] whose force is disturbed with the density d² (d in N/kN √s) gains information on a, for
+//! given b and c, at the rate 1 / d² while the train moves, at any speed and in any manoeuvre: every moment measures
+//! w0(v) = a + b v + c v² with the variance d² / dt, and the derivative of w0 by a is 1. The growth of the (a, a)
+//! entry of the information, the inverse of the published covariance, therefore gives d, including everything that
+//! widens the published covariance. The noise of the measured speed is the default of the pipeline.
 
 use dynocar_core::pipeline::train_kalman::{TrainKalmanSettings, declared_a_std};
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind};
 use nalgebra::Matrix3;
 
-/// The noise that an estimate of the resistance has to do with.
+/// Noise that limits an estimate of the resistance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunNoise {
     /// Standard deviation of a measured speed in m/s.
@@ -23,11 +22,11 @@ pub struct RunNoise {
     pub step_s: f64,
 }
 
-/// Time in s of the controller's clock between two looks.
+/// Least time in s of the controller's clock between two snapshots that are compared.
 const LOOK_S: f64 = 5.0;
-/// Looks that are remembered: the newest three minutes of motion.
+/// Number of rates that are remembered: those of the newest three minutes of motion.
 const LOOKS: usize = 36;
-/// Looks that say more than the whole time together.
+/// Least number of rates that are used; with fewer, the rate over the whole time counts.
 const LOOKS_MIN: usize = 4;
 /// Times between samples in s that can be.
 const STEP_S: (f64, f64) = (1e-4, 2.5);
@@ -124,8 +123,8 @@ fn information_on_a(snapshot: &ParameterSnapshot) -> Option<f64> {
     information.is_finite().then_some(information)
 }
 
-/// Returns the ninth decile: at other times the growth waits for what the mass, the wind and the scales of the forces
-/// leave open.
+/// Returns the ninth decile of some rates: most are lower, while mass, wind and the scales of the forces are not
+/// determined.
 fn fastest(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);

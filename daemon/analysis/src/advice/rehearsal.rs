@@ -1,9 +1,9 @@
-//! Knowledge of resistance and mass after a manoeuvre, by the pipeline that learns them.
+//! Standard deviations of resistance and mass after a manoeuvre, by the pipeline that estimates them.
 //!
-//! `train_kalman` itself is driven: from what is known now it holds the manoeuvre's first speed for a
-//! while, under the noise that the snapshots show, so that it knows how the unexplained force behaves;
-//! then it drives the manoeuvre. The share of each standard deviation that the manoeuvre leaves is the
-//! forecast. The noise is drawn from one fixed seed: a covariance hardly depends on it.
+//! `train_kalman` itself is driven. From the present estimates, it first holds the manoeuvre's initial speed for a
+//! while, under the noise that the snapshots show, so that it learns how the unexplained force behaves; then it drives
+//! the manoeuvre. The forecast is the share of each standard deviation that remains after the manoeuvre. The noise is
+//! drawn from one fixed seed, since a covariance hardly depends on it.
 
 use std::sync::Arc;
 
@@ -17,9 +17,9 @@ use nalgebra::{Matrix3, SVector};
 use super::manoeuvre::{DriveKind, PlannedManoeuvre, Scene};
 use super::noise::{ANSWERED, RunNoise};
 
-/// Shortest step in s; samples that come faster are taken together.
+/// Shortest step in s; faster samples are combined.
 const STEP_MIN_S: f64 = 0.2;
-/// Time in s in which the pipeline gets to know the noise.
+/// Time in s in which the pipeline learns the noise.
 const LEAD_IN_S: f64 = 30.0;
 /// Index of the mass among [`ANSWERED`].
 pub const MASS: usize = 3;
@@ -87,7 +87,7 @@ struct Rehearsal<'a> {
     pipeline: Pipeline,
     random: Random,
     step_s: f64,
-    /// Standard deviations in m/s of the measured speed, and of what disturbs it within a step.
+    /// Standard deviations in m/s of the measured speed, and of its disturbance within a step.
     measured_mps: f64,
     disturbed_mps: f64,
     sample: TrainSample,
@@ -133,7 +133,7 @@ impl<'a> Rehearsal<'a> {
         Some(Answered::new(a?, b?, c?, mass?))
     }
 
-    /// Drives a manoeuvre to its end; `is_free` holds a speed whatever the traction. Gives the time in s.
+    /// Drives a manoeuvre to its end; `is_free` holds a speed by any traction that this needs. Returns the time in s.
     fn drive(&mut self, drive: PlannedManoeuvre, is_free: bool) -> f64 {
         let gain = mps2_per_n_per_kn(self.scene.train.rotating_mass_factor);
         let weight_kn = TrainModel::weight_kn(self.scene.mass_kg);

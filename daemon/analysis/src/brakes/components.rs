@@ -1,9 +1,9 @@
-//! Probability that a brake of many units is weak, by importance sampling: to one stop in 10⁹.
+//! Probability that a brake of many units is weak, by importance sampling: down to one stop in 10⁹.
 //!
 //! A stop's deceleration over the nominal one is the mean over the units of (1 + friction)(1 + pressure)(1 +
 //! efficiency), 0 for a unit that failed, times (1 + common) / (1 + mass). For each level the draws are tilted
-//! exponentially towards where that level lies, by the saddle point of the first-order sum, and weighted back
-//! (Siegmund 1976; Bucklew 2004, chapter 5): the weights are exact, whatever the approximation of the tilt.
+//! exponentially towards that level, by the saddle point of the first-order sum, and weighted back (Siegmund 1976;
+//! Bucklew 2004, chapter 5): the weights are exact, although the tilt is approximate.
 
 use dynocar_model::train::BrakeComponents;
 use dynocar_shared::quantile::normal_quantile;
@@ -12,23 +12,23 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use crate::parallel::of_each_number;
 
-/// Draws of one stream of random numbers.
+/// Number of draws of one stream of random numbers.
 const BLOCK: usize = 1024;
 /// Greatest tilt in inverse standard deviations.
 const TILT_MAX: f64 = 60.0;
 
-/// A share of the nominal deceleration that all but some stops reach.
+/// Share of the nominal deceleration that all stops but a given fraction reach.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weakest {
     /// The share.
     pub share: f64,
     /// Relative standard deviation of the probability that was sampled at it.
     pub error: f64,
-    /// How many times more draws without tilt would have the same variance.
+    /// Number of draws without tilt that would have the same variance, as a multiple of the draws.
     pub gain: f64,
 }
 
-/// How draws are moved towards weak stops.
+/// Tilt of the draws towards weak stops.
 #[derive(Clone, Copy)]
 struct Tilt {
     /// Failure probability of a unit.

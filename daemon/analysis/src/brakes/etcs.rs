@@ -57,8 +57,8 @@ pub struct DeclaredBrakeFigures {
 }
 
 impl EtcsBrake {
-    /// Returns the parameters, and what each rests on. The form asks for all of them, and for factors at the boundaries
-    /// of the emergency steps: what is not known is replaced, and marked as a guess.
+    /// Returns the parameters, and the basis of each. The form requires all of them, and factors at the boundaries of
+    /// the emergency steps: an unknown parameter is replaced, and marked as a guess.
     pub fn new(found: &BrakeParameters, choice: &DeclaredBrakeFigures) -> (Self, Vec<Basis>) {
         let emergency = &found.emergency;
         let over = |value: f64| SpeedSteps::constant(value).between(&emergency.boundaries);

@@ -1,5 +1,5 @@
-//! The brake as train protection asks for it: steps of deceleration, how far stops fall short of them, and tables
-//! of stopping distances.
+//! The brake in the form that train protection requires: steps of deceleration, the shortfall of stops below them, and
+//! tables of stopping distances.
 
 mod components;
 mod etcs;

@@ -8,14 +8,15 @@ use super::components::weakest;
 use super::speed_steps::SpeedSteps;
 use crate::stops::{CutOff, DecelerationLaw, Manner, RecordedStop, StopStatistics};
 
-/// Levels of confidence that a balise may ask for (EBCL): all stops but one in 10 to the level reach it.
+/// Number of levels of confidence that a balise may ask for (EBCL): at level n, all stops but one in 10ⁿ reach the
+/// steps.
 pub const LEVELS: u32 = 10;
-/// Draws for a level.
+/// Number of draws for a level.
 const DRAWS: usize = 1 << 14;
 /// Seed of the draws.
 const SEED: u64 = 26;
 
-/// How far stops fall short of the steps at a level of confidence.
+/// Shortfall of stops below the steps at a level of confidence.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Correction {
     /// The level, 0 to 9.
@@ -41,7 +42,7 @@ impl Correction {
 /// The parameters.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BrakeParameters {
-    /// How many stops the emergency steps are of.
+    /// Number of stops that the emergency steps come from.
     pub stops: usize,
     /// Whether a record of the brake shows that it was applied in full in them.
     pub is_commanded: bool,
@@ -49,9 +50,10 @@ pub struct BrakeParameters {
     pub emergency: SpeedSteps,
     /// A_brake_service in m/s²; `None` without full service stops.
     pub service: Option<SpeedSteps>,
-    /// A_brake_normal_service in m/s²: what drivers use; `None` without their stops.
+    /// A_brake_normal_service in m/s²: the deceleration that drivers use; `None` without stops by less than all of the
+    /// brake.
     pub normal_service: Option<SpeedSteps>,
-    /// How many stops that is of.
+    /// Number of stops that the normal service steps come from.
     pub usual_stops: usize,
     /// The lower bound of the mean deceleration, that the emergency steps lie below: speed in m/s and m/s².
     pub bound: Vec<[f64; 2]>,
@@ -112,8 +114,8 @@ pub fn corrections(law: &DecelerationLaw, declared: Option<&BrakeComponents>) ->
     (0..LEVELS).map(level).collect()
 }
 
-/// Returns the components given the stops: what all units have in common is known as well as the stops show it, and
-/// what stops differ by beyond what the units explain is common to them.
+/// Returns the components given the stops: the stops narrow the error that all units share, and their scatter beyond
+/// that of the units is added to it.
 fn conditioned(declared: &BrakeComponents, law: &DecelerationLaw) -> BrakeComponents {
     let units = f64::from(declared.units);
     let alive = 1.0 - declared.failure_probability;

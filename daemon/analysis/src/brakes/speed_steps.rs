@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// Most steps of a curve.
+/// Greatest number of steps of a curve.
 pub const STEPS_MAX: usize = 7;
 
 /// Values over intervals of speed: one more value than boundaries, which grow strictly; the form of OSRD.

@@ -15,12 +15,11 @@ use crate::stops::{DecelerationLaw, Gradient};
 
 /// Speeds at which the deceleration of a table is free, as shares of the fastest.
 const KNOTS: [f64; 6] = [0.0, 0.08, 0.2, 0.4, 0.7, 1.0];
-/// The head of a table.
+/// Head line of a table.
 pub const HEAD: &str = "brake_curve,speed_kph,grade_1_in_x,stopping_distance_m";
-/// Traction's cut-off, build-up and rotating mass, then a deceleration at each knot.
+/// Number of free parameters: the traction's cut-off, the build-up, the rotating mass, and a deceleration at each knot.
 const FREE: usize = 3 + KNOTS.len();
-/// Relative error of a row beyond which it counts more than by its square, so that no row is
-/// sacrificed.
+/// Relative error of a row beyond which it counts more than by its square, so that no row is sacrificed to the others.
 const ROW_ERROR: f64 = 0.01;
 /// Dead times and build-ups in s from which the search starts.
 const STARTS_S: [(f64, f64); 4] = [(0.5, 1.0), (0.5, 6.0), (1.0, 20.0), (0.5, 60.0)];
@@ -224,8 +223,8 @@ const GRADIENTS: [f64; 14] = [
     -33.0,
 ];
 
-/// Returns the distances that 95 % of stops of a law keep, as a table of the same form; what a law does not reach or
-/// does not stop on is left out.
+/// Returns the distances that 95 % of stops of a law keep, as a table of the same form, without the speeds that the law
+/// does not reach and the gradients on which it does not stop.
 pub fn write(name: &str, law: &DecelerationLaw, rotating_mass_factor: f64) -> String {
     let name: String = name.chars().filter(|it| !matches!(it, ',' | '\n' | '\r' | '"')).collect();
     let mut text = format!("{HEAD}\n");

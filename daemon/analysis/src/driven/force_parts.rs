@@ -1,10 +1,10 @@
-//! The forces of a moment, part by part.
+//! The forces at one moment, part by part.
 
 use dynocar_model::train::{Davis, TrainModel};
 
 use crate::explain::evidence::SampleForces;
 
-/// A force along the travel; what retards is positive, but for traction, which drives.
+/// A force along the travel. Retarding forces are positive; traction is positive when it drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ForcePart {
     /// Traction force that acts, after gain and delay.
@@ -15,7 +15,7 @@ pub enum ForcePart {
     Gradient,
     /// Basic resistance by the Davis coefficients.
     Basic,
-    /// Curves.
+    /// Curve resistance.
     Curve,
     /// Tunnels, by their length, as share of c and in addition to it.
     Tunnel,
@@ -25,9 +25,9 @@ pub enum ForcePart {
     Ambient,
     /// Cold bearings.
     Bearing,
-    /// Places.
+    /// Resistance at certain places.
     Location,
-    /// Forms of their own.
+    /// Forces outside the library, by their form.
     Other,
 }
 
@@ -91,7 +91,7 @@ impl AccelerationBalance {
         self.forces.mass_kg
     }
 
-    /// Returns a part in N. On a standing train it is what would act.
+    /// Returns a part in N. On a standing train it is the force that would act.
     pub fn force_n(&self, part: ForcePart) -> f64 {
         let SampleForces { resistance, .. } = &self.forces;
         let (davis, speed_mps) = (self.davis, self.speed_mps);

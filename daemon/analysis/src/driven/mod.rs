@@ -1,8 +1,8 @@
 //! A train driven by forces: force in, speed out, by the law of the open-loop prediction.
 //!
-//! The forces of a moment come from [`ForceResolver`] and [`SampleForces`], as `explain` takes them
-//! over a recorded run, and each step is [`advance`]: what the updated model predicts there, the train
-//! drives here. Only the speed at which a resistance is evaluated is its own, not a measured one.
+//! The forces of a moment come from [`ForceResolver`] and [`SampleForces`], as in `explain` over a recorded run, and
+//! each step is [`advance`]: the train drives as the updated model predicts. Only the speed at which a resistance is
+//! evaluated is the train's own, and not a measured one.
 
 mod force_parts;
 
@@ -19,7 +19,7 @@ pub use force_parts::{AccelerationBalance, ForcePart};
 
 use crate::explain::evidence::SampleForces;
 
-/// How a train begins.
+/// State in which a train begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Beginning {
     /// Chainage of its centre in m.
@@ -30,7 +30,7 @@ pub struct Beginning {
     pub is_held_at_rest: bool,
 }
 
-/// A train on a line, moved by what acts on it.
+/// A train on a line, moved by the acting forces.
 #[derive(Clone, Debug)]
 pub struct DrivenTrain {
     train: Arc<TrainModel>,
@@ -72,11 +72,11 @@ impl LateSensor {
 }
 
 impl DrivenTrain {
-    /// Returns a train at its beginning; without a line the gradient comes with what acts.
+    /// Returns a train at its beginning; without a line the gradient comes with the acting forces.
     pub fn new(train: Arc<TrainModel>, track: Option<Arc<Track>>, beginning: Beginning) -> Self {
         let Beginning { position_m, speed_mps, is_held_at_rest } = beginning;
         let sensor = LateSensor::new(&train, speed_mps);
-        // The train is driven by what acts now, however late its sensor shows it.
+        // The forces that act now drive the train, however late its sensor shows the speed.
         let on_time = Corrections { speed_delay_s: 0.0, speed_lag_s: 0.0, ..train.corrections };
         let acting = TrainModel { corrections: on_time, ..TrainModel::clone(&train) };
         let forces = ForceResolver::new(Arc::new(acting), track);
@@ -99,8 +99,8 @@ impl DrivenTrain {
         shown_mps * self.train.corrections.speed_scale
     }
 
-    /// Dead time in s by which forces act later than they are reported, or by which the speed is shown
-    /// late, whichever is longer. The train remembers those of its last 1000 steps.
+    /// Returns the dead time in s by which forces act later than reported, or by which the sensor shows the speed late,
+    /// the longer of the two. The train remembers the forces and speeds of its last 1000 steps.
     pub fn dead_time_s(&self) -> f64 {
         let Corrections { actuator_delay_s, brake_delay_s, speed_delay_s, .. } =
             self.train.corrections;

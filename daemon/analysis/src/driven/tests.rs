@@ -1,4 +1,4 @@
-//! The driven train compared with the open-loop prediction, and where no recording goes.
+//! The driven train compared with the open-loop prediction, and tested in situations that no recording has.
 
 use dynocar_model::simulate::{OpenLoopRecording, Prediction, Restart};
 use dynocar_model::track::{Track, TrackCurve};
@@ -9,7 +9,7 @@ use dynocar_shared::TrainId;
 
 const DAVIS: Davis = Davis { a: 1.5, b: 0.02, c: 0.004 };
 
-/// Returns a train with a bit of every term that does not ask for its speed.
+/// Returns a train with several terms, none of which changes the measured speed.
 fn updated_train() -> TrainModel {
     let mut train = TrainModel::bare("grown", 100e3, DAVIS);
     train.rotating_mass_factor = 0.06;

@@ -33,7 +33,7 @@ named! {
 }
 
 impl ExplainAnswer {
-    /// Adds what limits the verdict.
+    /// Adds a sentence that limits the verdict.
     pub fn add_caveat(&mut self, sentence: &str) {
         self.statement += sentence;
         self.caveats.push(sentence.trim().to_owned());
@@ -114,8 +114,8 @@ pub struct EffectAnswer {
     pub parameters: BTreeMap<String, ParameterValue>,
     /// Their standard deviations.
     pub std: BTreeMap<String, ParameterValue>,
-    /// Probability that the search finds as much where nothing acts; of what is accepted because it is certain,
-    /// at most that of the least score which accepts.
+    /// Probability that the search finds as strong an effect where nothing acts; for an effect that is accepted because
+    /// it is certain, at most that of the least score which accepts.
     pub p_value: f64,
     /// Share of the open-loop error on the fit runs that goes when the effect is added last.
     pub error_reduction: f64,
@@ -181,12 +181,12 @@ pub struct Identifiability {
     pub kind: &'static str,
     /// Its parameter, with the unit.
     pub parameter: &'static str,
-    /// Standard deviation, a, b, c and what was found fitted beside it; `None` where the data say
+    /// Standard deviation, estimated jointly with a, b, c and the effects found; `None` where the data determine
     /// nothing.
     pub std: Option<f64>,
     /// Whether an effect that is large enough to matter would show.
     pub told: bool,
-    /// Other kinds beside which it would not: either could stand for the other.
+    /// Other kinds jointly with which it would not show: the data cannot distinguish the two.
     pub alike: Vec<&'static str>,
 }
 
@@ -269,7 +269,7 @@ pub struct VerdictWords {
     pub heading: String,
     /// With its effects.
     pub whole: String,
-    /// Sentences on what it leaves open, each behind a space.
+    /// Sentences on the questions that the verdict leaves open, each after a space.
     pub left: String,
 }
 
@@ -309,7 +309,7 @@ pub struct ExplainAnswer {
     pub metric: &'static str,
     /// Holdout runs with motion, which judge the model.
     pub scored_runs: usize,
-    /// Why nothing was scored, and what the errors on the fit runs are worth; absent when it was.
+    /// Why nothing was scored, with the errors on the fit runs; absent when the holdout runs were scored.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unscored: Option<String>,
     /// The error of the holdout runs that headlines state: from stop to stop where there are stops;

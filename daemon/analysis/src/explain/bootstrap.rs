@@ -4,11 +4,11 @@ use dynocar_core::filter::random::Random;
 
 /// Draws.
 const DRAWS: usize = 2000;
-/// The draws repeat from one answer to the next.
+/// Seed of the draws, fixed so that answers repeat.
 const SEED: u64 = 7;
 
-/// 95 % intervals of some statistics by drawing the units with replacement, all statistics of the same
-/// draws; `None` with fewer than two units, and where no draw has a value.
+/// Returns the 95 % intervals of some statistics by drawing the units with replacement, with the same draws for all
+/// statistics; `None` with fewer than two units, and where no draw has a value.
 pub fn intervals_95<T, const K: usize>(
     units: &[T],
     statistics: impl Fn(&[&T]) -> Option<[f64; K]>,

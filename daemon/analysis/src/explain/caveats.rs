@@ -1,4 +1,4 @@
-//! Limits of a verdict, in words; whether the data determine a, b and c at all.
+//! Limits of a verdict, in words, and whether the data determine a, b and c at all.
 
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -13,11 +13,11 @@ use super::selection::{Deviations, Search, SearchOutcome};
 
 use crate::statistics::share_of;
 
-/// How surely the numbers of a finished search are known.
+/// Uncertainty of the numbers of a finished search.
 pub struct FinishedFit<'a> {
-    /// The numbers.
+    /// The standard deviations.
     pub deviations: &'a Deviations,
-    /// The place of each effect.
+    /// The uncertainty of each effect's place.
     pub places: &'a [Option<PlaceUncertainty>],
     /// The numbers that change over the runs.
     pub courses: &'a [(EffectKind, Vec<Course>)],
@@ -115,7 +115,7 @@ pub fn told_by_data(problem: &FitProblem, deviation: &[f64]) -> DavisDeviations 
     DavisDeviations { a: share(0), b: share(1), c: share(2) }
 }
 
-/// In words which of them the data do not determine, and what would; empty when they determine all.
+/// Returns in words which of a, b and c the data hardly determine, and which runs would; empty when all are determined.
 pub fn undetermined(problem: &FitProblem, fit: &Fit, deviation: &[f64]) -> String {
     let DavisDeviations { a, b, c } = told_by_data(problem, deviation);
     let names = [("a", a), ("b", b), ("c", c)];

@@ -8,8 +8,8 @@ use super::evidence::{EQUAL, SCORE_MIN};
 use super::selection::{EffectTrial, Refusal, Search, SearchOutcome, is_certain_beside, penalty};
 use crate::statistics::least_first;
 
-/// A competing hypothesis takes away this share of what the accepted effect does of the open-loop error, and has this
-/// share of the least score.
+/// Least share of the accepted effect's error reduction, and of the least acceptance score, that a competing hypothesis
+/// must reach.
 const COMPETING_SHARE: f64 = 0.7;
 
 /// An accepted effect and the kinds that could stand in its place.
@@ -23,9 +23,10 @@ pub struct CompetingHypotheses {
 
 /// For each accepted effect that has some, the kinds that could stand in its place.
 ///
-/// Beside those that the runs could not distinguish from it whatever they showed, a competing hypothesis explains the data as
-/// well, would be accepted as the accepted one was, takes away about as much of the open-loop error, and has nothing left to explain once the effect
-/// is in: what keeps its evidence acts beside the effect and not in its place.
+/// A competing hypothesis explains the data as well, would be accepted as the accepted effect was, removes about as
+/// much of the open-loop error, and has nothing left to explain once that effect is in the model: a kind that keeps its
+/// evidence acts jointly with the effect and not in its place. Kinds that no run could distinguish from the effect
+/// compete in any case.
 pub fn competing_hypotheses(outcome: &SearchOutcome) -> Vec<CompetingHypotheses> {
     let effects = &outcome.fit.model.effects;
     let of = |accepted: EffectKind, tried: &[EffectTrial], twins: &[EffectKind]| {
@@ -62,7 +63,8 @@ fn comes_close(trial: &EffectTrial, accepted: &EffectTrial, outcome: &SearchOutc
     let may_be = match Search::refusal(trial) {
         _ if outcome.is_certain(accepted.kind) => is_certain_beside(trial, trial.bic_gain),
         None => true,
-        // Beside what the score accepted it is strong enough, on whichever side of the least score it lies.
+        // A trial is strong enough if its acceptance score comes close to the least one, which the accepted effect
+        // exceeded.
         Some(Refusal::Weak(_)) => {
             accepted.acceptance_score() > SCORE_MIN
                 && trial.acceptance_score() > COMPETING_SHARE * SCORE_MIN

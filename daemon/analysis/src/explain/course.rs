@@ -17,19 +17,19 @@ pub struct CoursePart {
     pub std: f64,
 }
 
-/// A number of an effect that is not the same in all runs.
+/// A number of an effect that differs between runs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Course {
     /// Name of the parameter, with the unit.
     pub parameter: &'static str,
-    /// The same over the runs, in their order.
+    /// The number in groups of consecutive runs, in their order.
     pub parts: Vec<CoursePart>,
-    /// Probability of as much of a change where there is none.
+    /// Probability of as large a change where there is none.
     pub p_value: f64,
 }
 
 impl Course {
-    /// States the course, and what follows from it.
+    /// Returns the course as a sentence, with the advice that follows from it.
     pub fn sentence(&self, kind: &str) -> String {
         let (words, unit) = parameter(self.parameter);
         let shown = |part: &CoursePart| {

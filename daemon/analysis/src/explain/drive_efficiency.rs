@@ -1,8 +1,8 @@
-//! The efficiency of a drive whose force is not recorded but its power: a scale that the runs determine
-//! through the mass, before anything undeclared is looked for.
+//! Efficiency of a drive whose recording has its power and not its force: a scale that the runs determine through the
+//! mass, estimated before the search for undeclared effects.
 //!
-//! The efficiency acts one way when the drive pulls and the other way when it brakes, and so do
-//! the auxiliaries: what is estimated of them holds for the declared mass.
+//! The efficiency acts one way when the drive pulls and the other way when it brakes, and so do the auxiliaries: their
+//! estimates hold for the declared mass.
 
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ use super::selection::{FORM_SHARE, OBSERVATIONS_MIN, deviations};
 use crate::dataset::{Dataset, Role};
 use crate::statistics::{rms, share_of};
 
-/// Efficiency, and what is fed beside the drive in kW beyond what is fed at rest.
+/// Efficiency, and the power in kW that auxiliaries take while the train drives, above their power at rest.
 const PARAMETERS: [Parameter; 2] = [
     Parameter::new(
         "efficiency",
@@ -28,7 +28,7 @@ const PARAMETERS: [Parameter; 2] = [
     ),
     Parameter::new("auxiliary_power_kw", (-2000.0, 2000.0), 0.1),
 ];
-/// Below this speed in m/s a drive takes nothing.
+/// Speed in m/s below which a drive takes no power.
 const RESTING_MPS: f64 = 0.05;
 /// Samples at rest from which the auxiliary power is known.
 const RESTING_MIN: usize = 30;

@@ -1,7 +1,7 @@
-//! The time of recorded forces: a recorder that averages over the second before its stamp, or stamps
-//! late, holds forces that act before their stamps, and at a sample a second that costs as much as all
-//! else together. It is learned before anything undeclared is looked for; a force that acts after its
-//! stamp is an actuator's delay, which is looked for.
+//! Time of the recorded forces. A recorder that averages over the second before its time stamp, or stamps late, holds
+//! forces that act before their stamps; in recordings with one sample per second this costs as much error as all other
+//! causes together. The lateness is estimated before the search for undeclared effects. A force that acts after its
+//! stamp is an actuator's delay, for which the search looks.
 
 use std::sync::Arc;
 
@@ -17,9 +17,9 @@ use super::evidence::{FitProblem, RunDataError, SampleForces, UpdatedModel, prep
 use super::selection::{OBSERVATIONS_MIN, deviations};
 use crate::dataset::{Dataset, Role};
 
-/// Samples nearer in time than this in s leave a late stamp to each run's own small delay.
+/// Where the samples are nearer in time than this in s, a late stamp is left to each run's own small delay.
 const STEP_MIN_S: f64 = 0.5;
-/// The same for a late stamp of less than this share of the step between samples.
+/// A lateness below this share of the step between samples is left to it as well.
 const LATE_SHARE_MIN: f64 = 0.1;
 
 const PARAMETERS: [Parameter; 1] = [Parameter::new("force_late_s", (-1.0, 1.0), 0.02)];
@@ -34,7 +34,7 @@ impl Hypothesis for LateStamps {
         Nature::new(EffectKind::ActuatorDelay, &PARAMETERS)
     }
 
-    /// Nothing acts before it: what it finds around a sample is the declaration.
+    /// No other effect acts before this one: the forces around a sample are the declared ones.
     fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
         let (late_s, time_s) = (parameters[0], run.recording.time_s());
         for (i, force) in (first..).zip(forces) {

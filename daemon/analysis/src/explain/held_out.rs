@@ -1,7 +1,7 @@
-//! Confirmation of effects by the runs held out: whether they act in them too, and how large they are there.
+//! Confirmation of effects by the holdout runs: whether they act in them too, and how large they are there.
 //!
-//! They know a, b, c and the usual errors as the fit runs do, and nothing of the effect: its numbers follow from the
-//! normal equations of the runs held out and from the information of the fit runs on everything else.
+//! The fit runs contribute their information on a, b, c and the usual errors, and none on the effect itself: its
+//! numbers follow from the normal equations of the holdout runs and from that information.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -11,16 +11,17 @@ use super::over_time::is_one_in_all_runs;
 use super::score::RunScore;
 use super::selection::{SearchOutcome, enlarged_by_scatter, std_with_forms};
 
-/// Fewer runs say little of each other.
+/// Least number of runs that can confirm an effect.
 const RUNS_MIN: usize = 8;
-/// Runs held out that show an effect this many times less surely than the fit runs say nothing.
+/// Holdout runs whose standard deviation of an effect exceeds that of the fit runs this many times say nothing.
 const DEVIATION_TIMES_MAX: f64 = 5.0;
 
-/// A run held out, reduced to what it says of a finished model.
+/// A holdout run, reduced to its information on a finished model.
 pub struct HeldOutRun {
     /// Errors without and with the effects.
     pub score: RunScore,
-    /// Its part of the evidence; `None` without effects, where it shows none, and where another run has it.
+    /// Its evidence on the effects; `None` without effects, where the run shows nothing of them, and where another run
+    /// has gathered it.
     evidence: Option<(RunNormal, Vec<RunPositions>)>,
 }
 
@@ -61,14 +62,14 @@ pub struct HeldOutEffect {
     pub theta: Vec<f64>,
     /// Their standard deviations.
     pub std: Vec<f64>,
-    /// Their covariance, without what the forms of effects add.
+    /// Their covariance, without the share of the forms of effects.
     pub covariance: DMatrix<f64>,
     /// Probability that the effect's numbers differ as much from those of the fit runs where they are the same.
     pub p_value: f64,
 }
 
-/// Returns what the runs held out say of each of the first `count` effects of a model; `None` for one that acts in
-/// some runs only or has more than two numbers, and where they hardly show it.
+/// Returns the numbers of each of the first `count` effects of a model by the holdout runs; `None` for an effect that
+/// acts in some runs only or has more than two numbers, and where these runs hardly show it.
 pub fn by_held_out_runs(
     (problem, fit): (&FitProblem, &Fit),
     runs: &[HeldOutRun],
@@ -106,7 +107,7 @@ pub fn by_held_out_runs(
     (0..count).map(of_effect).collect()
 }
 
-/// Returns information less all that is known of `size` parameters from `start` on, whatever they are.
+/// Returns the information with `size` parameters from `start` on marginalised out.
 fn without(information: &DMatrix<f64>, start: usize, size: usize) -> Option<DMatrix<f64>> {
     let own = information.view((start, start), (size, size)).into_owned();
     let shared = information.columns(start, size);

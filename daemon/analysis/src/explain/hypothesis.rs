@@ -16,7 +16,7 @@ use super::places::{IntervalEnd, Site};
 /// An effect with its structure (places, windows, runs) fixed, shared by models.
 pub type SharedHypothesis = Arc<dyn Hypothesis>;
 
-/// Published form of an estimate: values and standard deviations by the names of the answer.
+/// Estimates as the answer publishes them: values and standard deviations by name.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReportedValues {
     /// Values.
@@ -91,7 +91,7 @@ impl ReportContext<'_> {
 pub enum OnOthers {
     /// Nothing.
     Nothing,
-    /// It scales what they do, all alike.
+    /// It scales the resistances and gradients that they add, all by one factor.
     Scales,
     /// It changes them in another way, or takes their place.
     Changes,
@@ -100,11 +100,11 @@ pub enum OnOthers {
 /// When an effect acts among others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Turn {
-    /// Before the others: what is reported late, acts late.
+    /// Before the others, for example a delay of the reported forces.
     First,
     /// In the order in which they were found.
     Usual,
-    /// After the others: how the record was made changes what all of them do.
+    /// After the others, for example a delay of the measured speed, which changes how the forces of all others appear.
     Last,
 }
 
@@ -137,11 +137,11 @@ impl Past {
     }
 }
 
-/// Some samples of a run that follow each other, with what an effect remembers of those before.
+/// Some consecutive samples of a run, with the memory that an effect has of the samples before them.
 pub struct On<'a> {
     /// The run.
     pub run: &'a RunData,
-    /// Number of the first of them.
+    /// Index of the first of these samples in the run.
     pub first: usize,
     /// Memory of an effect that looks back; any value where the first sample is the run's own.
     pub past: &'a mut Past,
@@ -159,7 +159,7 @@ pub enum Handling {
     Gradient,
 }
 
-/// Properties of a structure, whatever the values of its parameters.
+/// Properties of a structure that do not depend on the values of its parameters.
 #[derive(Clone, Copy)]
 pub struct Nature<'h> {
     /// The kind it belongs to.
@@ -188,13 +188,14 @@ pub struct Nature<'h> {
     /// A function of each parameter in which the declared forces with this effect are affine, each by
     /// itself; `None` where there is none.
     pub affine_in: Option<fn(f64) -> f64>,
-    /// True where what it only resists with follows the speed.
+    /// True where a resistance that the effect adds depends on the speed.
     pub feels_speed: bool,
     /// True when its first parameter is the speed scale.
     pub changes_speed_scale: bool,
-    /// True when what it does at a sample takes something of those before.
+    /// True when the force of the effect at a sample depends on earlier samples.
     pub looks_back: bool,
-    /// True when what it follows is one number a run: then a run is one observation of it, however long.
+    /// True when the effect depends on one number per run, such as the outside temperature: then a run is one
+    /// observation of it, however long.
     pub is_one_number_a_run: bool,
     /// Whether it could act in the place of another effect.
     pub may_stand_for_others: bool,
@@ -227,7 +228,7 @@ impl<'h> Nature<'h> {
 
 /// A structure that a kind proposes: everything but the values of its parameters.
 pub trait Hypothesis: Send + Sync + std::fmt::Debug {
-    /// Returns the properties of the structure, whatever the values of its parameters.
+    /// Returns the properties of the structure, which do not depend on the values of its parameters.
     fn nature(&self) -> Nature<'_>;
 
     /// Returns the kind it belongs to.
@@ -265,7 +266,7 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         permille.resize(run.samples().len(), 0.0);
     }
 
-    /// Returns the factor on what they do, where it [scales](OnOthers::Scales) them.
+    /// Returns the factor on the resistances and gradients of other effects, where it [scales](OnOthers::Scales) them.
     fn scale_of_others(&self, _parameters: &[f64]) -> f64 {
         1.0
     }
@@ -295,12 +296,13 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         1.0
     }
 
-    /// By how many s the measured speed is late, the sum of its parameters; `None` for what makes none late.
+    /// Returns by how many s the measured speed is late, the sum of its parameters; `None` for an effect that does not
+    /// delay the speed.
     fn speed_late_s(&self, _parameters: &[f64]) -> Option<f64> {
         None
     }
 
-    /// Returns the site at which it was found; `None` for what has none.
+    /// Returns the site at which it was found; `None` for an effect without a site.
     fn site(&self) -> Option<&Site> {
         None
     }
@@ -342,18 +344,18 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         0.0
     }
 
-    /// Returns whether the effect is larger than what declared figures are usually good for.
+    /// Returns whether the effect is larger than the usual errors of declared figures.
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
         self.nature().least.is_none_or(|least| self.size(parameters).abs() > least)
     }
 
-    /// Returns why parameters like these are not what the kind says, whatever speaks for them.
+    /// Returns why the kind cannot have parameters like these, however strong their evidence.
     fn contradiction(&self, _parameters: &[f64]) -> Option<&'static str> {
         None
     }
 
-    /// Returns the first parameter that lies at a bound of the quantity looked for, other than at no effect: the
-    /// data ask for something else, or hold it not at all.
+    /// Returns the first parameter that lies at a bound of its range, unless that bound is the value of no effect: such
+    /// data demand another effect, or do not determine this one.
     fn at_bound(&self, parameters: &[f64]) -> Option<AtBound> {
         let mut specs = self.parameters().iter().zip(parameters);
         specs.find_map(|(spec, &value)| {
@@ -376,7 +378,7 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         (!numbers.is_empty()).then_some(numbers)
     }
 
-    /// Returns the law in a formula, for what has no name.
+    /// Returns the law as a formula, for an effect that has no name.
     fn formula(&self, _parameters: &[f64]) -> Option<String> {
         None
     }

@@ -1,8 +1,8 @@
 //! Numbers of train and line that the data determine or leave open, apart from the effects found.
 //!
-//! Every kind of the library that is one number of the whole train or line is added to the finished model, at no
-//! effect, and the information matrix shows how surely it is zero, and whether it is distinguishable from each of
-//! the others.
+//! Every kind of the library that has one number for the whole train or line, and was not found, is added to the
+//! finished model at no effect. The information matrix then gives the standard deviation of its number, and shows
+//! whether the kind is distinguishable from each of the others.
 
 use dynocar_model::words::{kind_name, number, parameter};
 use dynocar_shared::HALF_95;
@@ -14,7 +14,7 @@ use super::competing::separating_run;
 use super::effects::{Candidate, LIBRARY};
 use super::selection::{Search, SearchOutcome};
 
-/// Returns the kinds that are one number of the whole train or line, and not found.
+/// Returns the kinds that have one number for the whole train or line and were not found.
 fn whole_kinds(search: &Search, outcome: &SearchOutcome) -> Vec<Candidate> {
     let Some(scan) = search.scan(&outcome.fit) else { return Vec::new() };
     let others = LIBRARY.iter().filter(|effect| !outcome.fit.model.has(effect.kind));
@@ -65,8 +65,8 @@ pub fn identifiability(search: &Search, outcome: &SearchOutcome) -> Vec<Identifi
     (0..kinds.len()).map(one).collect()
 }
 
-/// In words what the data would not show, which kinds they cannot distinguish, and what would; empty where
-/// they hold all; a sentence or two each.
+/// Returns in words the effects that the data would not show and the pairs of kinds that they cannot distinguish, each
+/// with the runs that would; empty where the data determine all.
 pub fn not_held(all: &[Identifiability]) -> Vec<String> {
     let would = |own: &Identifiability| {
         EffectKind::from_name(own.kind).map_or("more runs", |kind| KindRow::of(kind).determined_by)

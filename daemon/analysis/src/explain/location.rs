@@ -1,4 +1,4 @@
-//! Location of an effect, and how surely it is known.
+//! Location of an effect, and its uncertainty.
 
 use std::collections::BTreeMap;
 
@@ -24,7 +24,7 @@ pub struct CovariateRange {
     pub range: [f64; 2],
 }
 
-/// How surely a window's ends are known.
+/// Uncertainty of a window's ends.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WindowUncertainty {
     /// The run's file.

@@ -1,10 +1,10 @@
 //! Many runs: the search uses some of them, evenly chosen and thinned to a second; then all of them determine the sizes
 //! of the effects found, and score the prediction.
 //!
-//! Whatever the number of runs, a fixed number is held in memory. Then all are read one after the other, as recorded, and
-//! reduced to their normal equations at the finished model, which add up, or to their errors. What acts in some runs only
-//! is known of those that the search looked at: then these alone say how large it is. Likewise a run counts only as far
-//! along the line as searched ones go: beyond, nobody looked for effects.
+//! A fixed number of runs is held in memory, however many there are. Then all runs are read one after the other, as
+//! recorded, and reduced to their normal equations at the finished model, which add up, or to their errors. An effect
+//! that acts in some runs only is known from the searched runs alone, and these determine its size. A run counts only
+//! as far along the line as the searched runs go, since the search looked for no effects beyond.
 
 use std::sync::Arc;
 
@@ -20,11 +20,13 @@ use crate::parallel;
 
 /// Largest number of fit runs that are all searched, as they were recorded.
 pub const FIT_RUNS_MAX: usize = 32;
-/// Least and greatest number of searched fit runs where there are more, of which a quarter is searched.
+/// Least and greatest number of searched fit runs where there are more: a quarter of them is searched within these
+/// bounds.
 const FIT_RUNS_HELD: [usize; 2] = [12, 24];
 /// Number of holdout runs that are held for effects in single runs.
 const HOLDOUT_RUNS_HELD: usize = 6;
-/// The golden ratio less 1: its multiples, less their whole parts, lie evenly, and in step with no order of the runs.
+/// Golden ratio less 1: its multiples, less their whole parts, are spread evenly, and follow no periodic order of the
+/// runs.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// Returns the number of fit runs that are held.
@@ -38,7 +40,7 @@ fn fit_runs_held(fit: usize) -> usize {
 /// Fit runs that follow each other make a group, of which one run is held.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Held {
-    /// By run, what it is one of.
+    /// Group of each run.
     groups: Vec<Group>,
 }
 
@@ -156,7 +158,7 @@ impl Preparation {
 
 /// Runs of which not all are in memory.
 pub struct Many<'a, E> {
-    /// All of them, with what is known of each; none needs to have its samples.
+    /// All of them, with the properties of each; their samples need not be there.
     pub dataset: &'a Dataset,
     /// Which of them are held.
     pub held: &'a Held,
@@ -278,7 +280,7 @@ impl<E: From<RunDataError> + Send> Many<'_, E> {
         self.held.spans(&self.dataset.runs)
     }
 
-    /// Returns how many runs say what, as a sentence to follow another.
+    /// Returns how many runs determine the sizes of effects, as a sentence to follow another.
     pub(super) fn sentence(&self, outcome: &SearchOutcome) -> String {
         let fit = self.dataset.with_role(Role::Fit).count();
         let sizes = match is_common(&outcome.fit) {

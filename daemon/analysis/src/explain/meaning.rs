@@ -1,4 +1,4 @@
-//! Meaning of an effect to a railway: energy on the line, and metres after a minute.
+//! Meaning of an effect to a railway: energy on the line, and the error in m of a prediction over a minute.
 
 use dynocar_model::simulate::{ForceModel, MOVING_SPEED_MPS, Prediction, Restart};
 use dynocar_model::units::J_PER_KWH;

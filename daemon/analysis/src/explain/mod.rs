@@ -1,19 +1,19 @@
-//! Explaining a residual: the part of the motion that the declared model does not predict, the undeclared effect that
-//! explains it, its significance, and the prediction of the model with the effect.
+//! Explanation of a residual: the part of the motion that the declared model does not predict, the undeclared effect
+//! that causes it, the significance of this effect, and the prediction of the model with it.
 //!
 //! # Layout, in the order of the work
 //!
 //! - [`evidence`]: observations, noise, the joint fit of a, b, c and effects
-//! - [`drive_efficiency`]: the efficiency of a drive of which only the power is recorded
-//! - [`force_time`]: forces that act before their stamps
+//! - [`drive_efficiency`]: the efficiency of a drive whose recording has its power and not its force
+//! - [`force_time`]: forces that act before their time stamps
 //! - [`hypothesis`], [`effects`]: the interface of an effect; the library, one file for each kind
-//! - [`scan`], [`places`], [`residual_pressure`]: what a force of some shape, at some place or
-//!   time, would explain
-//! - [`selection`]: the search for effects, its significance, evidence by run, the finished model beside what is
-//!   usually wrong
+//! - [`scan`], [`places`]: the gain of a force of a given shape, and the interval, runs or window of time where it acts
+//! - [`residual_pressure`]: brake-cylinder pressure that stays while no brake is reported
+//! - [`selection`]: the search for effects, their significance, the evidence of each run, and the finished model fitted
+//!   jointly with the usual errors
 //! - [`score`], [`stop_to_stop`], `bootstrap`: open-loop prediction of fit and holdout runs
-//! - [`many`]: some of many runs for the search, all of them for sizes and scores
-//! - [`course`], [`over_time`], [`held_out`]: numbers that differ between runs, and confirmation by the runs held out
+//! - [`many`]: with many runs, some of them for the search, all of them for sizes and scores
+//! - [`course`], [`over_time`], [`held_out`]: numbers that differ between runs, and confirmation by the holdout runs
 //! - [`unexplained`], [`identifiability`], [`competing`], [`meaning`], `caveats`, [`verdict`],
 //!   [`answer`]: the statement
 //! - [`report`]: further contents of a report
@@ -80,9 +80,9 @@ pub struct Explanation {
     pub preparation: Preparation,
 }
 
-/// Explains what the declared model of a dataset leaves.
+/// Explains the residual of a dataset's declared model.
 ///
-/// Holdout runs are read once, to score the finished model. Of [`many`] fit runs the search looks at some.
+/// Holdout runs are read once, to score the finished model. Of [`many`] fit runs, the search uses some.
 ///
 /// # Errors
 ///
@@ -98,7 +98,7 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
     explained(Cow::Owned(chosen), Some(Many { dataset, held: &held, read: &read }), progress)
 }
 
-/// Explains what the declared model leaves of many runs, of which the held ones are in memory.
+/// Explains the residual of the declared model over many runs, of which only the `held` ones are in memory.
 ///
 /// # Errors
 ///
@@ -216,7 +216,7 @@ impl FoundForces {
     }
 }
 
-/// Runs made ready, with what was found of their forces.
+/// Prepared runs, with the corrections of their forces that were found.
 struct Prepared {
     forces: FoundForces,
     preparation: Preparation,

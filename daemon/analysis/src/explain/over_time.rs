@@ -1,10 +1,10 @@
 //! Course of an effect over the runs: an effect that grows, fades or changes at once is shown over time, and not
 //! averaged.
 //!
-//! Each run has its own normal equations at the finished model. A number that differs from run to run by a given
-//! course (a line, or a step between two runs) is one parameter more, and follows from them by linear algebra: the runs
-//! are not read again. How surely is known from the scatter between the runs (the sandwich estimator
-//! of White 1980, each run left out as in MacKinnon and White 1985), never less than the likelihood allows.
+//! Each run has its own normal equations at the finished model. A number that differs from run to run by a given course
+//! (a line, or a step between two runs) is one more parameter, and follows from these equations by linear algebra: the
+//! runs are not read again. Its uncertainty follows from the scatter between the runs (the sandwich estimator of White
+//! 1980, each run left out as in MacKinnon and White 1985), and is never less than the likelihood allows.
 
 use dynocar_model::terms::{Parameter, wheel};
 use dynocar_shared::HALF_95;
@@ -16,16 +16,16 @@ use super::course::{Course, CoursePart};
 use super::evidence::{Fit, FitProblem, RunNormal};
 use super::hypothesis::Hypothesis;
 
-/// Fewer runs show no course.
+/// Least number of runs that can show a course.
 const RUNS_MIN: usize = 8;
 /// Least number of runs on each side of a step.
 const STEP_RUNS_MIN: usize = 3;
-/// Number of runs of a shown part, at least, and the greatest number of parts.
+/// Least number of runs in a shown part, and greatest number of parts.
 const PART_RUNS_MIN: usize = 2;
 const PARTS_MAX: usize = 6;
-/// A change is stated where chance makes as much less often than this: of a course, all that were looked for together.
+/// Greatest probability by chance of a change that is stated, for all courses tried together.
 pub const CHANCE_MAX: f64 = 1e-3;
-/// A number of an effect with more is one value of a profile.
+/// Greatest number of parameters of an effect whose courses are tried: one with more is a profile.
 const NUMBERS_MAX: usize = 2;
 
 /// First and last file of the runs that make a row of normal equations.
@@ -87,7 +87,7 @@ fn by_positions(problem: &FitProblem, fit: &Fit, spans: &[Span]) -> Option<Cours
     runs.course(wheel::PARAMETERS[0].name, std, spans)
 }
 
-/// Adds to each run what its own positions say of the scale of its speeds.
+/// Adds to each run the information of its positions on the scale of its speeds.
 fn add_positions(problem: &FitProblem, scale: f64, number: usize, runs: &mut [RunNormal]) {
     for (own, run) in runs.iter_mut().zip(&problem.runs) {
         let Some((ratio, std)) = run.distance_ratio else { continue };
@@ -97,7 +97,7 @@ fn add_positions(problem: &FitProblem, scale: f64, number: usize, runs: &mut [Ru
     }
 }
 
-/// Normal equations of runs, and the parameter that is looked at.
+/// Normal equations of runs, and the parameter that is examined.
 struct Runs<'a> {
     runs: &'a [RunNormal],
     /// Information and score before the data.
@@ -108,7 +108,7 @@ struct Runs<'a> {
 }
 
 impl Runs<'_> {
-    /// Returns the course where one shows that is larger than the 95 % interval of what is stated for all runs.
+    /// Returns the most significant course, where its change exceeds half the 95 % interval of the common number.
     fn course(&self, parameter: &'static str, std: f64, spans: &[Span]) -> Option<Course> {
         if self.runs.len() < RUNS_MIN {
             return None;
@@ -156,7 +156,7 @@ impl Runs<'_> {
             toward += run.information.column(i) * (t * size);
             t * toward[i] - weights.dot(&toward)
         };
-        // A run moves the size towards itself by its own share of what is known of it.
+        // A run pulls the size towards itself by its share of all information on the size.
         let share = |(t, run): (&f64, &RunNormal)| {
             let own = &run.information * &weights;
             (t * t * run.information[(i, i)] - 2.0 * t * own[i] + weights.dot(&own)) / information

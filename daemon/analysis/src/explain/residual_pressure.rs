@@ -4,13 +4,13 @@ use super::answer::RunWindow;
 use super::evidence::RunData;
 use crate::statistics::middle;
 
-/// After the brake force is gone, the cylinders get this time in s to empty.
+/// Time in s in which the cylinders empty after the brake force has gone.
 const RELEASE_S: f64 = 6.0;
-/// A lasting pressure below this in Pa is nothing.
+/// Least lasting pressure in Pa that counts.
 const STEP_MIN_PA: f64 = 2500.0;
-/// The step must be this many times the scatter.
+/// Least size of a step, in multiples of the scatter.
 const STEP_SPREADS: f64 = 4.0;
-/// Released samples needed on either side.
+/// Least number of released samples on either side of a step.
 const SAMPLES_MIN: usize = 20;
 
 /// Times in s from the run's start and pressures in Pa while the brake is released.

@@ -1,9 +1,9 @@
 //! Gain of a force of a given shape, without a new fit.
 //!
-//! At a fitted model the innovations are orthogonal to the regressors. The decrease of the cost
-//! by one more linear parameter then follows from three inner products of its whitened regressor:
-//! with the innovations, with itself and with the other regressors. They add up over runs, so that
-//! thousands of places, windows and sets of runs can be compared.
+//! At a fitted model the innovations are orthogonal to the regressors. The cost decrease by one more linear parameter
+//! then follows from three inner products of its whitened regressor: with the innovations, with itself and with the
+//! other regressors. These products add up over runs, so that thousands of places, windows and sets of runs can be
+//! compared.
 
 use std::sync::{Arc, OnceLock};
 
@@ -45,7 +45,7 @@ impl Tuple {
         self.cross += &other.cross;
     }
 
-    /// Takes out what [`add`](Tuple::add) put in.
+    /// Removes the products that [`add`](Tuple::add) added.
     pub fn take_out(&mut self, other: &Tuple) {
         self.score -= other.score;
         self.square -= other.square;
@@ -191,8 +191,8 @@ impl<'a> Scan<'a> {
         tuple
     }
 
-    /// Decrease of the cost when an effect acts, by what it changes at a sample in m/s²: from the declaration
-    /// to what acts. Some of many runs stand for all: it chooses where a fit starts.
+    /// Returns the decrease of the cost when an effect acts, from the change in m/s² that it makes at a sample, by its
+    /// declared and its actual forces. Some of many runs stand for all: the result only chooses where a fit starts.
     pub fn decrease_by(
         &self,
         effect: &dyn Hypothesis,

@@ -1,4 +1,4 @@
-//! Open-loop prediction: the judge of a finished model.
+//! Open-loop prediction, which judges a finished model.
 
 use dynocar_model::simulate::{Prediction, Restart, SpeedError};
 
@@ -60,7 +60,7 @@ pub fn run_error(fit: &Fit, run: &RunData, restart: Restart) -> SpeedError {
     error
 }
 
-/// Errors with some parameters and with what differs from run to run, restarted in some ways.
+/// Errors of a run with given parameters and its own factors, restarted in each of the given ways.
 fn errors_at<const N: usize>(
     fit: &Fit,
     theta: &[f64],
@@ -93,15 +93,15 @@ fn stop_errors_mps(run: &RunData, before: &Fit, after: &Fit) -> Vec<[f64; 2]> {
     pairs.map(|(before, after)| [before, after]).collect()
 }
 
-/// Open-loop errors of the fit runs: as fitted, and each run by what the others say of it.
+/// Open-loop errors of the fit runs: of each run as fitted, and as predicted from the others.
 #[derive(Clone, Copy, Debug)]
 pub struct FitErrors {
-    /// Root mean squares in m/s as fitted and left out, each over whole runs and with restarts
-    /// every 60 s, and over whole runs with each run's own load and wind where they stand beside the model.
+    /// Root mean squares in m/s as fitted and left out, each over whole runs, with restarts every 60 s, and over whole
+    /// runs with each run's own load and wind where the model is fitted jointly with them.
     speed_mps: [[f64; 3]; 2],
-    /// Share by which the integrated speed misses the measured distance, with what that is known to.
+    /// Share by which the integrated speed misses the measured distance, with the standard deviation of this ratio.
     distance: f64,
-    /// Whether the model looks for the scale of the speeds: nothing else is judged by the way.
+    /// Whether the model estimates the scale of the speeds: only this number is judged by the distance.
     has_speed_scale: bool,
 }
 
@@ -119,9 +119,9 @@ impl FitErrors {
         }
     }
 
-    /// Returns the share of the error that a model with these errors takes away from another: over whole runs, with
-    /// restarts, with each run's own load and wind or, for the scale of the speeds, of the distance, whichever is most;
-    /// of runs that were fitted or of runs left out, whichever is less.
+    /// Returns the share of the error that a model with these errors removes from another. Of the shares over whole
+    /// runs, with restarts, with each run's own load and wind and, where only one of the two models scales the speeds,
+    /// of the distance, the largest counts; of runs as fitted and runs left out, the smaller.
     pub fn reduction_from(&self, before: &Self) -> f64 {
         let share = |before: f64, after: f64| if before > 0.0 { 1.0 - after / before } else { 0.0 };
         let of_distance = if self.has_speed_scale == before.has_speed_scale {
@@ -167,7 +167,7 @@ pub fn reduction(problem: &FitProblem, smaller: &Fit, larger: &Fit) -> f64 {
     FitErrors::new(problem, larger).reduction_from(&FitErrors::new(problem, smaller))
 }
 
-/// Errors without and with the effects over some parts together, in m/s, and what is taken away.
+/// Errors in m/s without and with the effects, pooled over some parts, and the share that the effects remove.
 pub fn pooled(parts: impl Iterator<Item = [SpeedError; 2]>) -> Option<[f64; 3]> {
     let sum =
         parts.fold([SpeedError::default(); 2], |sum, part| [sum[0] + part[0], sum[1] + part[1]]);

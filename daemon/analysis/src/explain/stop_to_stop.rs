@@ -1,10 +1,10 @@
-//! Errors from stop to stop, and the error by which a model is judged: that of runs from stop to stop where there
-//! are any, each from a departure, at the last sample at rest, to the next standstill for itself, since a pooled error is
-//! ruled by a few runs that creep.
+//! Errors from stop to stop, and the error that judges a model: that of runs from stop to stop where there are any.
+//! Each of these runs goes from a departure, at the last sample at rest, to the next standstill. Each counts by itself,
+//! since a few runs that creep would dominate a pooled error.
 //!
-//! Over a whole run every error is carried on: where a stop is cut off or shorter than it was, the
-//! predicted train runs on with a speed that the measured one does not have, and the error of all
-//! that follows says nothing of the forces there.
+//! Over a whole run every error is carried on: where a stop is cut off or shortened in the recording, the predicted
+//! train runs on with a speed that the measured train does not have, and all later errors say nothing of the forces
+//! there.
 
 use std::ops::Range;
 
@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::bootstrap::intervals_95;
 use crate::statistics::{median, rms};
 
-/// A run that moves for less time in s is a shunt in a queue, and says little.
+/// Least moving time in s of a run that counts: a shorter one is a shunt in a queue, and shows little.
 const STOP_RUN_MOVING_MIN_S: f64 = 10.0;
 
 /// Returns the runs from stop to stop that can be simulated from departure to standstill: first sample,
@@ -56,13 +56,13 @@ pub struct StopToStop {
     /// where there is one recorded run only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interval_95_mps: Option<[[f64; 2]; 2]>,
-    /// Root mean square of their errors in m/s, each as much as any other: before and after. What acts at
-    /// few places moves no median.
+    /// Root mean square of their errors in m/s, each with the same weight: before and after. An effect that acts at few
+    /// places does not move the median.
     pub rms_mps: [f64; 2],
     /// 95 % intervals of the two by the same draws.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_interval_95_mps: Option<[[f64; 2]; 2]>,
-    /// 95 % interval of 1 - after / before of that.
+    /// 95 % interval of 1 - after / before of these root mean squares.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reduction_interval_95: Option<[f64; 2]>,
     /// The errors in m/s themselves, before and after, by recorded run.

@@ -1,25 +1,26 @@
-//! Remainder when the search is done: whether noise explains it, and where it lives.
+//! Remainder after the search: whether noise explains it, and where it acts.
 
 use super::answer::Location;
 use super::selection::{Refusal, Search, SearchOutcome};
 use dynocar_model::words::kind_name;
 use dynocar_shared::vocabulary::EffectKind;
 
-/// Time in s over which the force that is left is averaged: gusts and joints of rails are gone.
+/// Time in s over which the remaining force is averaged, long enough that gusts and rail joints average out.
 const OVER_S: f64 = 60.0;
-/// Noise averages to less than this share of the basic resistance: gusts, the map's error and the
-/// force sensors leave up to 0.11 of it in simulated datasets and 0.18 in recorded ones
-/// (`unexplained_n_per_kn` of `dynocar-bench explain --verbose`).
+/// Greatest share of the basic resistance that noise leaves on average: gusts, the map's error and the force sensors
+/// leave up to 0.11 of it in simulated datasets and 0.18 in recorded ones (`unexplained_n_per_kn` of `dynocar-bench
+/// explain --verbose`).
 const NOISE_SHARE_MAX: f64 = 0.3;
 
 /// Residual of the finished model.
 pub struct Unexplained {
-    /// Standard deviation in N/kN of the force that is left, on average over a minute.
+    /// Standard deviation in N/kN of the remaining force, averaged over a minute.
     pub n_per_kn: f64,
-    /// The same over the declared basic resistance.
+    /// The same as a share of the declared basic resistance.
     pub share: f64,
-    /// Refused explanations that all but a bound speaks for, with the refusal: trials of the last round, the
-    /// strongest first, and where nothing is found, those found before the usual errors were included.
+    /// Explanations refused only because a parameter lies at a bound or contradicts the kind, with the refusal: trials
+    /// of the last round, strongest first, and where nothing is found, those dropped when the usual errors were
+    /// included.
     pub refused: Vec<(EffectKind, Refusal)>,
     /// Where a force outside the library explains most.
     pub place: Option<Location>,

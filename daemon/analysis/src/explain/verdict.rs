@@ -109,7 +109,7 @@ fn impossible(diagnostics: &[DatasetDiagnostic]) -> Option<Words> {
     (!faults.is_empty()).then(|| (VerdictWords::from_text(words()), Some(to_do.into())))
 }
 
-/// Returns why nothing was scored, and what is known instead; `None` when something was.
+/// Returns why nothing was scored, with the errors on the fit runs; `None` when the holdout runs were scored.
 fn unscored(search: &Search, score: &PredictionScore) -> Option<String> {
     if score.holdout_rmse_mps()[0].is_some() {
         return None;

@@ -6,19 +6,19 @@ use dynocar_model::train::Davis;
 use crate::dataset::document::Item;
 use crate::dataset::{DatasetError, SourcePosition};
 
-/// How a file is to be read where its format leaves a choice.
+/// How to read a file where its format leaves a choice.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ImportReading {
     /// Share of the permitted load that is on the train, 0 to 1, where a file gives the load.
     pub load_share: f64,
-    /// Which of several effort curves counts, by the name of its mode; the file's default without.
+    /// Name of the mode whose effort curve is used where there are several; the file's default without it.
     pub mode: Option<String>,
 }
 
 /// Outcome of a field.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FieldOutcome {
-    /// It stands under a key.
+    /// It was converted to a key.
     Taken {
         /// The field, with its unit where the format has one.
         field: String,
@@ -27,7 +27,7 @@ pub enum FieldOutcome {
         /// How it was converted or read.
         how: String,
     },
-    /// It was read and has no place.
+    /// It was read, but there is no key for it.
     Left {
         /// The field.
         field: String,

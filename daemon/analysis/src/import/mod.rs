@@ -1,9 +1,8 @@
-//! Other projects' descriptions of trains and lines, read into the contents of `train.toml` and
-//! `track.toml`. The content of a file shows which project's it is.
+//! Other projects' descriptions of trains and lines, read into the contents of `train.toml` and `track.toml`. The
+//! content of a file shows the project that it comes from.
 //!
-//! Texts come in; what comes out are numbers in SI units and an account of every field: which key it
-//! became and how, what has no place or is not understood, and which keys the file does not give.
-//! Nothing is made up.
+//! Texts come in; numbers in SI units and an account of every field come out: the key that the field became and how,
+//! the fields that have no key or are not understood, and the keys that the file does not give. No value is invented.
 //!
 //! # Layout, in the order of the work
 //!

@@ -1,7 +1,7 @@
 //! OSRD's rolling stock: a train with its Davis coefficients and effort curves.
 //!
-//! Some files state A, B and C in N, N/(m/s) and N/(m/s)² for the whole train, others the same for each
-//! kg, and none says which. The two differ by the mass in kg, so that the size distinguishes them.
+//! Some files state A, B and C in N, N/(m/s) and N/(m/s)² for the whole train, others for each kg, and no file states
+//! which. The two differ by the mass in kg, so that the size distinguishes them.
 
 use dynocar_model::train::numbers::{LENGTH, MASS, ROTATING_MASS_FACTOR};
 use dynocar_model::train::{Davis, TrainModel};
@@ -12,7 +12,7 @@ use crate::dataset::document::{Item, above_zero};
 use crate::dataset::train_file::{EffortEntry, growing};
 use crate::dataset::{DatasetError, unusual_resistance};
 
-/// Why fields have no place, and which.
+/// Reasons why fields have no key, and these fields.
 const WITHOUT_PLACE: [(&str, &str); 9] = [
     ("a deceleration, no force: write [brake] by hand", "const_gamma, gamma"),
     ("no limit of speed has a place", "max_speed"),

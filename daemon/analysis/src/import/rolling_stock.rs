@@ -16,8 +16,8 @@ const WITHOUT_PLACE: [(&str, &str); 4] = [
     ("train.toml holds no speed limit", "speed_limit"),
 ];
 
-/// Returns the trains of files of one schema, whose vehicles may stand in another of the files. Without a
-/// train each vehicle is one.
+/// Returns the trains of files of one schema, whose vehicles may stand in another of the files. If no file has a train,
+/// each vehicle is one.
 pub(super) fn trains(
     roots: &[Item],
     reading: &ImportReading,

@@ -8,14 +8,14 @@ use crate::dataset::document::{Item, above_zero};
 use crate::dataset::keys::track::{LENGTH, PERMITTED_SPEED};
 
 const SECTIONS: &str = "characteristic_sections";
-/// Why fields have no place, and which.
+/// Reasons why fields have no key, and these fields.
 const WITHOUT_PLACE: [(&str, &str); 3] = [
     ("track.toml holds no identifier", "UUID"),
     ("track.toml holds no description", "description"),
     ("points where a run is to be measured, no stops", "points_of_interest"),
 ];
 
-/// A section: from `position_m` on, until the next.
+/// A section from `position_m` to the next section.
 struct Section {
     position_m: f64,
     speed_mps: Option<f64>,

@@ -1,4 +1,4 @@
-//! Imports of whole files, number by number.
+//! Imports of whole files, each number checked.
 
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 

@@ -1,4 +1,4 @@
-//! YAML as a tree whose every node knows its line. JSON is YAML too, so that both are read alike.
+//! YAML as a tree in which every node knows its line. JSON is YAML too, so that both are read in the same way.
 
 use granit_parser::{Event, Parser, ScalarStyle};
 
@@ -6,7 +6,7 @@ use crate::dataset::DatasetError;
 use crate::dataset::SourcePosition;
 use crate::dataset::node::{Node, NodeContent};
 
-/// No format nests deeper; a file that does would cost stack.
+/// Greatest depth of nesting: no format is deeper, and a file that is would use up the stack.
 const DEPTH_MAX: usize = 64;
 
 /// Reads a file's only document; `label` names the file in messages.

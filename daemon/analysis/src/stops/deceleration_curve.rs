@@ -11,23 +11,23 @@ const SPEED: usize = 0;
 const DECELERATION: usize = 1;
 /// Fewest samples of a stop.
 const SAMPLES_MIN: usize = 4;
-/// A normalised innovation beyond which a speed counts less (Huber 1964).
+/// Normalised innovation beyond which a speed counts less (Huber 1964).
 const HUBER: f64 = 3.0;
-/// The brake builds up until the deceleration reaches this share of what follows...
+/// The brake has built up when the deceleration reaches this share of the following deceleration...
 const BUILT_UP: f64 = 0.9;
 /// ... over this time in s...
 const FOLLOWS_S: f64 = 3.0;
-/// ... and is taken for settled this time in s later.
+/// ... and counts as settled this time in s later.
 const SETTLES_S: f64 = 2.0;
-/// A deceleration below this share of an earlier one is that of a brake that was eased...
+/// The brake was eased when the deceleration is below this share of an earlier one...
 const EASED: f64 = 0.7;
-/// ... if it differs by this many standard deviations.
+/// ... and differs from it by this many standard deviations.
 const EASED_STDS: f64 = 2.0;
-/// Below this speed in m/s a full brake may be let go, too.
+/// Speed in m/s below which a full brake may be released, too.
 const SOFT_MPS: f64 = 2.0;
 /// Standard deviation in m/s² of the deceleration at the start of a stop.
 const START_STD_MPS2: f64 = 1.0;
-/// Standard deviations in m/s of a measured speed that are tried.
+/// Standard deviations in m/s of a measured speed that the fit tries.
 const NOISES_MPS: [f64; 9] = [0.002, 0.005, 0.01, 0.02, 0.04, 0.07, 0.12, 0.2, 0.35];
 /// Standard deviations in m/s² that the deceleration gains in 1 s, that are tried.
 const WALKS_MPS2: [f64; 8] = [0.0005, 0.003, 0.008, 0.02, 0.05, 0.1, 0.2, 0.4];
@@ -52,9 +52,9 @@ pub struct DecelerationPoint {
 
 /// Speed and deceleration along one stop.
 ///
-/// The deceleration walks at random, with a trend or without; how much, and how noisy the speed
-/// is, are those with the greatest likelihood of the speeds. While the brake builds up it walks further than later, so that
-/// what follows is smoothed by itself.
+/// The deceleration walks at random, with a trend or without; the size of the walk and the noise of the speed have the
+/// greatest likelihood of the speeds. While the brake builds up the deceleration walks further than later, so that the
+/// later part is smoothed by itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DecelerationCurve {
     /// The moments, in order.
@@ -120,8 +120,8 @@ impl DecelerationCurve {
     }
 }
 
-/// Returns the moment after which the deceleration goes on as the brake gives it: a while after it first
-/// reached what follows.
+/// Returns the moment after which the deceleration is that of the built-up brake: a while after it first reached the
+/// deceleration that follows.
 fn built_up(points: &[DecelerationPoint]) -> Option<usize> {
     let reaches = |from: usize| {
         let point = &points[from];

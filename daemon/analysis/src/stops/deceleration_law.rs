@@ -1,4 +1,4 @@
-//! Deceleration over speed of all stops, how much stops differ, and how long the next one is.
+//! Deceleration over speed of all stops, the differences between stops, and the length of the next stop.
 
 use dynocar_shared::{BrakeResponse, EffortPoint, Stop, StoppingEstimate, Uncertain};
 use serde::Serialize;
@@ -7,9 +7,9 @@ use super::deceleration_curve::{DecelerationCurve, DecelerationPoint};
 
 /// Step of the speeds in m/s at which the law is reported.
 const GRID_MPS: f64 = 1.0;
-/// Weight of the assumed repeatability: that of this many stops more than one.
+/// Degrees of freedom of the assumed repeatability: it counts as this many stops more than one.
 const ASSUMED_FREEDOM: f64 = 4.0;
-/// Relative standard deviation of the response of a stop that is assumed likewise.
+/// Relative standard deviation of a stop's response, assumed with the same degrees of freedom.
 const ASSUMED_RESPONSE: f64 = 0.1;
 /// Standard normal quantile of a bound that 95 % of stops keep.
 const BOUND: f64 = 1.645;
@@ -90,8 +90,7 @@ pub struct DecelerationLaw {
     pub points: Vec<LawPoint>,
     /// How the brake comes after its command.
     pub response: MeasuredResponse,
-    /// Standard deviation of a stop's deceleration over the law's: from the stops, and what was
-    /// assumed beforehand.
+    /// Standard deviation of a stop's deceleration over the law's: from the stops, and from the assumption before them.
     pub repeatability: f64,
     /// Degrees of freedom of the repeatability.
     pub freedom: f64,

@@ -1,4 +1,4 @@
-//! Brakings to standstill in a run, in full or as a driver wanted, and the moment at which the traction ended.
+//! Brakings to standstill in a run, in full or by the driver's choice, and the moment at which the traction ended.
 
 use std::ops::RangeInclusive;
 
@@ -10,24 +10,24 @@ use serde::Serialize;
 use crate::dataset::ForceSource;
 use crate::statistics::{middle, span};
 
-/// Below this speed in m/s a driver may let the brake go, so that the stop is soft.
+/// Speed in m/s below which a driver may release the brake for a soft stop.
 const SOFT_MPS: f64 = 2.0;
-/// Without a record of the brake, a train that loses less than this in m/s² is not braking.
+/// Least loss of speed in m/s² of a braking train, where there is no record of the brake.
 const BRAKING_MPS2: f64 = 0.2;
-/// Time in s over which the loss of speed is taken.
+/// Time in s over which the loss of speed is measured.
 const LOOK_BACK_S: f64 = 3.0;
-/// Share of the brake's effort from which on it is applied at all.
+/// Share of the brake's effort above which it counts as applied.
 const APPLIED_AT_ALL: f64 = 0.1;
-/// Without a record of the brake, a driver eases and renews it on the way down and creeps to the mark: the
-/// fall goes on where the train was faster by this rate in m/s²...
+/// Without a record of the brake, a driver may ease and renew it on the way down and creep to the mark: the stop began
+/// earlier if the train was faster by this rate in m/s²...
 const FALLING_MPS2: f64 = 0.08;
 /// ... and a step of a coarse recorder in m/s...
 const STEP_MPS: f64 = 0.3;
-/// ... at some moment of this time in s before...
+/// ... within this time in s before...
 const EASED_S: f64 = 15.0;
-/// ... or, slower than this in m/s, creeping, of this time in s.
+/// ... or, while it creeps below this speed in m/s, faster by the step alone within this time in s.
 const CREEPING: (f64, f64) = (2.5, 40.0);
-/// A longer time in s between two samples, or this many usual ones, ends a stop.
+/// Longest time in s between two samples of a stop, and the same in usual intervals; the greater counts.
 const GAP_MAX: (f64, f64) = (3.0, 1.6);
 /// A recorder that pauses while a slow train stands may leave out the standstill: the train could come to it
 /// in the pause at this deceleration in m/s².

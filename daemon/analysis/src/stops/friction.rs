@@ -1,9 +1,8 @@
 //! The pipelines of Jin 2020 and Xie 2019 over one stop, fed with a brake of unknown force.
 //!
-//! Nobody measured a pressure, so a gear is declared that would give the mean deceleration of the
-//! stop at a friction coefficient of 0.3: what the pipeline then reports is the shape of the
-//! friction over speed, and its scale is a convention. What the rail carried is no convention: it
-//! is at least the retarding force over the weight.
+//! Nobody measured a pressure, so a gear is declared that would give the mean deceleration of the stop at a friction
+//! coefficient of 0.3: the pipeline then reports the shape of the friction over speed, and its scale is a convention.
+//! The adhesion is no convention: it is at least the retarding force over the weight.
 
 use std::sync::Arc;
 
@@ -16,7 +15,7 @@ use serde::Serialize;
 
 use super::deceleration_curve::DecelerationCurve;
 
-/// Friction coefficient that the mean deceleration of the stop is declared to need.
+/// Friction coefficient at which the declared gear gives the mean deceleration of the stop.
 const DECLARED_FRICTION: f64 = 0.3;
 /// Cylinder pressure in Pa of the declared brake.
 const PRESSURE_PA: f64 = 300e3;
@@ -26,7 +25,7 @@ const PRESSURE_PA: f64 = 300e3;
 pub struct FrictionPoint {
     /// Speed in m/s of the sample that closed the estimate.
     pub speed_mps: f64,
-    /// Friction over that which gives the stop's mean deceleration.
+    /// Friction as a share of that which gives the stop's mean deceleration.
     pub share: f64,
     /// Its standard deviation.
     pub share_std: f64,
@@ -55,7 +54,7 @@ pub fn friction(
         sample.set(SampleField::BrakeCylinderPressure, PRESSURE_PA);
         sample.set(SampleField::TractionForce, 0.0);
         if track.is_none() && sample.get(SampleField::Gradient).is_none() {
-            // The mean gradient is part of what is called friction then.
+            // Without a gradient, the mean gradient becomes part of the friction.
             sample.set(SampleField::Gradient, 0.0);
         }
         let [brake, rail] = &mut pipelines;

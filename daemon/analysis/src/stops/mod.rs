@@ -1,14 +1,14 @@
 //! Analysis of recorded stops with a brake whose force nobody measured: deceleration over speed, the friction
 //! behind it, and the length of the next stop.
 //!
-//! - [`find`]: where in a run the brake was applied until the train stood
+//! - [`find`]: the spans of a run in which the brake was applied until the train stood
 //! - [`DecelerationCurve`]: speed and deceleration along one stop, from its speeds alone
-//! - [`DecelerationLaw`]: deceleration over speed of all stops, and how much stops differ
-//! - [`StoppingDistance`]: how long the next stop is, with a bound
+//! - [`DecelerationLaw`]: deceleration over speed of all stops, and the differences between stops
+//! - [`StoppingDistance`]: the length of the next stop, with a bound
 //! - [`friction`]: the pipelines of Jin 2020 and Xie 2019 over a stop, fed with a brake of unknown force
-//! - [`CutOff`]: when the traction of a braked train was gone
-//! - [`StopStatistics`]: all stops together, whatever the driver wanted
-//! - [`Study`]: all of it over a dataset
+//! - [`CutOff`]: the moment at which the traction of a braked train ended
+//! - [`StopStatistics`]: all stops together, in full or by the driver's choice
+//! - [`Study`]: the whole analysis of a dataset
 
 mod deceleration_curve;
 mod deceleration_law;

@@ -1,4 +1,4 @@
-//! A recorded stop, and all stops of a dataset together: from which speeds, how long, how hard, and how long the train stood.
+//! A recorded stop, and all stops of a dataset together: their speeds, lengths, decelerations and standing times.
 
 use serde::Serialize;
 
@@ -9,19 +9,19 @@ use super::friction::FrictionPoint;
 use crate::dataset::Role;
 use crate::statistics::span;
 
-/// Stops are counted together whose speeds lie in the same step of this size in m/s.
+/// Step in m/s of the initial speeds of stops that are counted together.
 const STEP_MPS: f64 = 5.0;
-/// Step in m/s at which decelerations are summed up.
+/// Step in m/s of the speeds at which decelerations are counted together.
 const SPEEDS_MPS: f64 = 2.0;
 
-/// The middle of some values and what 80 % of them lie within.
+/// The median of some values, and the interval in which 80 % of them lie.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct QuantileRange {
-    /// A tenth is below.
+    /// A tenth of the values is below.
     pub low: f64,
-    /// Half is below.
+    /// Half of the values is below.
     pub median: f64,
-    /// A tenth is above.
+    /// A tenth of the values is above.
     pub high: f64,
 }
 
@@ -50,7 +50,7 @@ pub struct FromSpeed {
     pub mean_deceleration_mps2: QuantileRange,
 }
 
-/// Decelerations of all stops at a speed: what drivers choose, and what the brake gives at least.
+/// Decelerations of all stops at a speed: the drivers' choice, and the least that the brake can give.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct DecelerationSpread {
     /// Speed in m/s.
@@ -154,7 +154,7 @@ pub struct RecordedStop {
     pub no_law: Option<String>,
     /// Deceleration at whole m/s, from fast to slow.
     pub decelerations: Vec<DecelerationPoint>,
-    /// For a stop held out: what the law said of it.
+    /// For a holdout stop: the prediction of the law.
     pub predicted: Option<StoppingDistance>,
     /// The friction behind it.
     pub friction: Vec<FrictionPoint>,

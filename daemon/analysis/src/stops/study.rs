@@ -1,4 +1,4 @@
-//! All of it over a dataset: the law from the stops of fit runs, tried on those held out.
+//! Study of the stops of a dataset: the law from the stops of fit runs, tested on those of holdout runs.
 
 use dynocar_model::terms::gradient;
 use dynocar_model::terms::wheel::STANDING_MPS;
@@ -14,7 +14,7 @@ use super::friction::friction;
 use super::stop_statistics::{Manner, RecordedStop, StopStatistics};
 use crate::dataset::{Dataset, Role, Run};
 
-/// How stops are found, and what is assumed of them.
+/// How stops are found, and the assumptions on them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StudySettings {
     /// Conditions of a stop.

@@ -1,4 +1,4 @@
-//! An alignment on the plane: points of equal spacing, looked up by chainage and by place; its curves.
+//! An alignment on the plane: points of equal spacing, found by chainage and by place, and its curves.
 
 use std::collections::HashMap;
 
@@ -6,7 +6,7 @@ use super::geodesy::{between, distance_squared};
 
 /// Distance in m between the nodes of an alignment.
 pub const NODE_STEP_M: f64 = 10.0;
-/// Size in m of the cells in which places are looked up.
+/// Size in m of the cells by which places are found.
 const CELL_M: f64 = 50.0;
 
 /// An alignment as a line through nodes about 10 m apart.
@@ -17,7 +17,7 @@ pub struct Alignment {
     cells: HashMap<(i64, i64), Vec<u32>>,
 }
 
-/// Where a point lies beside an alignment.
+/// Position of a point relative to an alignment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Foot {
     /// Chainage in m of the nearest point of the alignment.
@@ -27,7 +27,7 @@ pub struct Foot {
 }
 
 impl Alignment {
-    /// An alignment through points; `None` when they are not two places apart.
+    /// Returns an alignment through points; `None` when it would be shorter than a step between its nodes.
     pub fn through(points_m: &[[f64; 2]]) -> Option<Alignment> {
         let mut sums = vec![0.0];
         for pair in points_m.windows(2) {

@@ -56,7 +56,7 @@ impl Banded {
     /// When the matrix is not positive definite.
     pub fn factor(mut self) -> Result<BandedCholesky, NotPositive> {
         let (width, stride) = (self.width, self.width + 1);
-        // Of a column what lies below the diagonal, the lowest first: as rows lie in memory.
+        // The entries of a column below the diagonal, the lowest first, in the order of rows in memory.
         let mut column = vec![0.0; width];
         for k in 0..self.size {
             let pivot = self.below[k * stride];

@@ -1,30 +1,29 @@
-//! Decides whether both directions run on one track, and which stretches they share.
+//! Decision whether both directions run on one track, and which parts they share.
 
 use super::alignment::Alignment;
 use super::recording::SAME_ALIGNMENT_M;
 use crate::statistics::share_of;
 
-/// Both directions take the same way when so much of what both drive lies within `SAME_TRACK_M`.
+/// Least share of the common part of two directions on one track that lies within `SAME_TRACK_M`.
 const SAME_TRACK_SHARE: f64 = 0.97;
-/// Distance in m of two tracks of the same way.
+/// Greatest distance in m between the two directions' alignments where they are on one track.
 const SAME_TRACK_M: f64 = 25.0;
-/// Difference in m between the chainages of two alignments at the same places, up to which they are one.
+/// Greatest difference in m between the chainages of two alignments at the same places, if they are one.
 const SAME_CHAINAGE_M: f64 = 15.0;
-/// Lengths of one track as two directions measure them differ by less than this share.
+/// Greatest difference between the lengths of one track as two directions measure them, as a share.
 const DRIFT_SHARE: f64 = 0.005;
-/// The same, for each m of the line: lengths drift unevenly.
+/// Additional difference for each m of the line, since the measured lengths drift unevenly.
 const UNEVEN_SHARE: f64 = 0.0005;
-/// Where a line crosses itself, there and back differ by more than this many m.
+/// Least difference in m between the ways there and back that shows a crossing of the line with itself.
 const CROSSING_MIN_M: f64 = 300.0;
-/// Where each goes on alone for this many m at the same end, they fork there.
+/// Least length in m over which each direction goes on alone at the same end, if they fork there.
 const FORK_M: f64 = 100.0;
 
-/// Two alignments, each in its direction of travel, beside one another.
+/// Comparison of two alignments, each in its direction of travel.
 pub struct Compared {
     /// Chainage in m along the growing alignment where the falling one starts.
     pub start_chainage_m: f64,
-    /// The track of both, for growing chainage, as far as either drives it; `None` where they are
-    /// two.
+    /// The track of both, for growing chainage, as far as either drives it; `None` where they are two tracks.
     pub joined: Option<Alignment>,
 }
 

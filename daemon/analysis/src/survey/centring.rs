@@ -1,4 +1,4 @@
-//! The alignment itself from the fixes of many passes.
+//! Alignment of a line from the fixes of many passes.
 
 use super::alignment::Alignment;
 use super::banded::Banded;
@@ -11,12 +11,12 @@ use crate::statistics::median;
 pub const FIX_STD_M: f64 = 4.0;
 /// Time constant in s with which the error of fixes fades.
 pub const FIX_FADING_S: f64 = 12.0;
-/// Part of a fix's error in m that is new in each of them.
+/// Part of a fix's error in m that is independent from fix to fix.
 const FIX_WHITE_M: f64 = 0.3;
-/// Typical second difference in m of an alignment's nodes: a curve of 5 km. Its distribution has long
-/// tails, so that a street corner is one too.
+/// Typical second difference in m of an alignment's nodes: a curve of 5 km. Its distribution has long tails, so that a
+/// street corner is possible too.
 const BEND_M: f64 = 0.02;
-/// Rounds of placing the fixes and moving the alignment.
+/// Number of rounds that place the fixes and move the alignment.
 const ROUNDS: usize = 4;
 
 /// Rows of a recording that run along an alignment.

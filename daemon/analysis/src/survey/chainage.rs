@@ -1,9 +1,9 @@
-//! The chainage of every row: the distance counted by the wheels, corrected by GNSS.
+//! The chainage of every row: the distance by the wheels, corrected by GNSS.
 //!
-//! The wheels count the distance with a scale error that stays over a pass and slips that add up like
-//! a random walk. A fix lies `lag * speed` behind, since it is older than its stamp, and errs by
-//! some metres that fade over seconds. A Kalman filter with a smoother (Rauch, Tung and Striebel
-//! 1965) over [offset, scale, error of the fix, lag] takes them apart, robust to single wild fixes.
+//! The wheels measure the distance with a scale error that stays over a pass and with slips that add up like a random
+//! walk. A fix lies `lag * speed` behind the train, since it is older than its time stamp, and has an error of some
+//! metres that fades over seconds. A Kalman filter with a smoother (Rauch, Tung and Striebel 1965) over [offset, scale,
+//! error of the fix, lag] separates these, robust to single wild fixes.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -14,11 +14,11 @@ use crate::explain::answer::WithStd;
 
 /// Standard deviation in m of the wheels' slip over 1 m; it grows with the root of the distance.
 const SLIP_M: f64 = 0.05;
-/// Part of a fix's error in m that is new in each of them.
+/// Part of a fix's error in m that is independent from fix to fix.
 const FIX_WHITE_M: f64 = 0.7;
-/// Rounds of weighing wild fixes down.
+/// Number of rounds that lower the weight of wild fixes.
 const ROUNDS: usize = 4;
-/// A fix that is off by this many m counts half.
+/// Error in m of a fix that counts half.
 const HALF_WEIGHT_M: f64 = 2.5;
 
 type State = SVector<f64, 4>;

@@ -7,8 +7,8 @@ use super::observation::BlockDifference;
 /// Acceleration of gravity in m/s².
 pub const GRAVITY_MPS2: f64 = 9.81;
 
-/// The common unknowns: a, b, c in N/kN (v in m/s), the factor on the declared mass less 1, the
-/// seconds by which forces are stamped too early, and the mass of a passenger in kg.
+/// The common unknowns: a, b, c in N/kN (v in m/s), the factor on the declared mass less 1, the time in s by which
+/// forces act before their time stamps, and the mass of a passenger in kg.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Common(pub SVector<f64, { Common::COUNT }>);
 
@@ -26,8 +26,7 @@ impl Common {
         self.0[3]
     }
 
-    /// Returns the seconds by which forces act before their stamp: the force at a time is the one stamped
-    /// so much later.
+    /// Returns the time in s by which forces act before their time stamps.
     pub fn delay_s(&self) -> f64 {
         self.0[4]
     }
@@ -41,7 +40,7 @@ impl Common {
 /// Declared values of a vehicle, and their uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prior {
-    /// Declared mass in kg, without what is counted.
+    /// Declared mass in kg, without counted passengers.
     pub mass_kg: f64,
     /// Declared mass of a passenger in kg.
     pub passenger_kg: f64,
@@ -51,7 +50,7 @@ pub struct Prior {
     pub davis: [f64; 3],
     /// Typical speed in m/s.
     pub speed_mps: f64,
-    /// True when the recordings declare what the vehicle weighs, rather than a nominal mass.
+    /// True when the recordings declare a weighed mass, rather than a nominal one.
     pub is_weighed: bool,
     /// True when passengers are counted.
     pub has_passengers: bool,

@@ -1,4 +1,4 @@
-//! The line that is driven repeatedly, and which parts are passes of it.
+//! The line that is driven repeatedly, and the parts of recordings that are passes of it.
 
 use super::alignment::Alignment;
 use super::both_directions::{Compared, compare};
@@ -9,17 +9,17 @@ use super::silence::{TracePoint, filled, trace};
 use super::tracking::follow;
 use crate::parallel;
 
-/// Parts that are tried as the line, and parts that each is compared with, at most.
+/// Greatest number of parts that are tried as the line, and of parts with which each is compared.
 const TRIED_MAX: usize = 12;
-/// Passes that the alignment is laid through, at most: more make it no better than GNSS itself.
+/// Greatest number of passes through which the alignment is laid: more make it no better than GNSS itself.
 const ALIGNED_MAX: usize = 60;
-/// Parts among which the line is looked for, at most.
+/// Greatest number of parts among which the line is sought.
 const SOUGHT_MAX: usize = 10 * ALIGNED_MAX;
 /// Distance in m between the points of a part.
 const POINT_STEP_M: f64 = 20.0;
-/// A pass covers at least this share of the line, or `PASS_MIN_M`.
+/// Least share of the line that a pass covers, unless it covers `PASS_MIN_M`.
 const PASS_SHARE_MIN: f64 = 0.25;
-/// A pass of this many m is worth having however long the line is.
+/// Length in m of a pass that is useful on a line of any length.
 const PASS_MIN_M: f64 = 1000.0;
 
 /// The alignments of a line, each in its direction of travel.
@@ -133,8 +133,8 @@ pub fn find(
     Some(Alignments { falling, ..alone(growing) })
 }
 
-/// Returns the alignment of a direction from its own parts: where they differ from the other direction's,
-/// they know better. A single part cannot say what of it is the line.
+/// Returns the alignment of a direction from its own parts, which show better where it differs from the other
+/// direction's. A single part does not show how much of it is the line.
 fn alignment_of(
     template: &Alignment,
     along: &[(RecordingPart, SurveyPass)],
@@ -172,7 +172,7 @@ fn rows_of(part: &RecordingPart, recordings: &[SurveyRecording]) -> std::ops::Ra
     first..end
 }
 
-/// Returns the part that the others follow furthest, cut to what at least one other drives too.
+/// Returns the part that the others follow furthest, cut to the section that at least one other part drives too.
 fn template(
     recording_parts: &[RecordingPart],
     recordings: &[SurveyRecording],

@@ -1,4 +1,4 @@
-//! Geographical positions as metres on a plane, and points there.
+//! Geographical positions as metres on a plane, and distances there.
 
 /// Semi-major axis in m of the ellipsoid of WGS 84.
 const SEMI_MAJOR_M: f64 = 6_378_137.0;
@@ -7,7 +7,7 @@ const FLATTENING: f64 = 1.0 / 298.257_223_563;
 
 /// The plane that touches the ellipsoid, raised to a height, at one point: east and north in m.
 ///
-/// Ways of up to 50 km keep their length within 3e-5.
+/// Paths of up to 50 km keep their length within 3e-5.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LocalPlane {
     latitude_deg: f64,

@@ -1,5 +1,5 @@
-//! Learning a profile from passes with a chainage: its smoothness, and the force of the friction brake from the balance
-//! under brake pressure.
+//! Estimation of a profile from passes with a chainage: its smoothness, and the force of the friction brake from the
+//! balance of forces under brake pressure.
 
 use super::banded::NotPositive;
 use super::observation::BlockDifference;
@@ -13,21 +13,20 @@ use crate::statistics::{middle, share_of};
 const WALKS_PER_M: [f64; 9] = [1e-9, 1e-8, 1e-7, 3e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4];
 /// Number of groups in which passes are left out.
 const FOLDS: u32 = 5;
-/// A brake acts over a whole observation when its lowest pressure is this many times the one from which on it may
-/// act.
+/// Least ratio of the lowest pressure in an observation to the pressure from which a brake may act, if the brake acts
+/// over the whole observation.
 const CLEAR: f64 = 1.5;
-/// Where no pass can be left out, blocks of this many m are.
+/// Length in m of the blocks that are left out where no pass can be.
 const BLOCK_M: f64 = 100.0;
 
-/// A profile and what it was learned with.
+/// A profile with the results of its estimation.
 #[derive(Clone, Debug)]
 pub struct LearnedProfile {
     /// The profile.
     pub profile: HeightProfile,
     /// Variance per m of the gradient's random walk, chosen by leaving passes out.
     pub walk_per_m: f64,
-    /// Root mean square in N of the residuals of passes left out, by pass; `NaN` for a pass of
-    /// which there is no other.
+    /// Root mean square in N of the residuals of passes left out, by pass; `NaN` for a pass without any other.
     pub left_out_n: Vec<f64>,
     /// The friction brake, where it shows.
     pub brake: Option<FoundBrake>,
@@ -90,7 +89,7 @@ fn group(evidence: &ProfileEvidence, observation: &BlockDifference, by_pass: boo
     if passes <= FOLDS { observation.pass } else { (observation.pass / 2) % FOLDS }
 }
 
-/// Returns the walk under which what was left out is predicted best: how smooth a line is, some passes of it show.
+/// Returns the walk that predicts left-out observations best; some passes show how smooth a line is.
 fn smoothest(evidence: &ProfileEvidence) -> Result<f64, NotPositive> {
     let few = evidence.of_few_passes();
     let evidence = if can_leave_out(&few) { &few } else { evidence };

@@ -1,9 +1,9 @@
-//! A line that nobody surveyed, from recordings of trains that drove it with GNSS.
+//! Survey of a line from recordings of trains that drove it with GNSS.
 //!
-//! A gradient from GNSS altitude is worse than none: noise in a regressor attenuates its
-//! coefficient, and the mass, the rotating mass or the gain of the forces pay for it. The forces
-//! themselves say what the gradient is: over many passes the balance of forces leaves nothing else
-//! that depends on the place and turns its sign with the direction.
+//! A gradient from GNSS altitude is worse than no gradient: noise in a regressor attenuates its coefficient, at the
+//! cost of the mass, the rotating mass or the gain of the forces. The forces themselves show the gradient: over many
+//! passes, only the gradient changes the balance of forces with the place and with opposite signs in the two
+//! directions.
 //!
 //! # Layout, in the order of reading
 //!
@@ -14,7 +14,7 @@
 //! - [`observation`], [`common`], [`profile`], [`learn`]: gradient, resistance, mass,
 //!   time offset and friction brake from the balance of forces; [`normal`], [`banded`]: its unknown heights,
 //!   their equations and the solver
-//! - [`survey()`]: all of it in turn
+//! - [`survey()`]: all steps in order
 
 pub mod alignment;
 pub mod banded;

@@ -15,7 +15,7 @@ pub type BorderColumns = Vec<[f64; COUNT]>;
 
 /// Information of some observations, or of the prior, on the unknowns.
 pub struct Normal {
-    /// Of the heights.
+    /// Information on the heights.
     pub matrix: Banded,
     /// Right-hand side of the heights.
     pub right: Vec<f64>,
@@ -39,7 +39,7 @@ impl Normal {
         }
     }
 
-    /// Adds what is known of the common unknowns beforehand.
+    /// Adds the prior information on the common unknowns.
     pub fn add_common(&mut self, (corner, right): (CommonCovariance, SVector<f64, COUNT>)) {
         self.corner += corner;
         self.corner_right += right;
@@ -68,7 +68,7 @@ impl Normal {
         }
     }
 
-    /// Adds what others say.
+    /// Adds the information of other observations.
     pub fn add(&mut self, other: Normal) {
         self.matrix.add(&other.matrix);
         self.right.iter_mut().zip(&other.right).for_each(|(own, more)| *own += more);
@@ -128,7 +128,7 @@ pub struct HeightSolution {
     pub common: Common,
     /// Covariance of the common unknowns, with the heights' noise let in.
     pub covariance: CommonCovariance,
-    /// Inverse of the heights' matrix times what they share with the common unknowns.
+    /// Inverse of the heights' matrix times the border of the common unknowns.
     pub columns: BorderColumns,
     /// Factor of the heights' matrix.
     pub factor: BandedCholesky,
@@ -195,8 +195,8 @@ impl HeightLayout {
         self.blocks.iter().map(|block| block.1).sum()
     }
 
-    /// Diagonals beside the main one: a vehicle, the reach of a block of time, and what an
-    /// uncertainty is stated over.
+    /// Returns the number of diagonals on one side of the main one, for the length of a vehicle, the reach of a block
+    /// of time, and the distance over which an uncertainty is stated.
     pub fn width(&self, reach_max_m: f64) -> usize {
         let reach = (self.vehicle_m.max(HEIGHT_STEP_M) + 2.0 * reach_max_m) / HEIGHT_STEP_M;
         (reach.ceil() as usize + 3).max(STATED_STEPS)

@@ -11,9 +11,9 @@ use super::chainage::Chained;
 use super::recording::RawRecording;
 use crate::statistics::middle;
 
-/// Below this speed in m/s holding brakes and stiction act.
+/// Speed in m/s below which holding brakes and stiction act.
 const MOVING_MPS: f64 = 0.8;
-/// Rows further apart than this many s are not joined.
+/// Longest step in s between rows that are joined.
 const STEP_MAX_S: f64 = 2.5;
 
 /// One difference of two blocks.
@@ -21,7 +21,7 @@ const STEP_MAX_S: f64 = 2.5;
 pub struct BlockDifference {
     /// Number of the pass.
     pub pass: u32,
-    /// Place in m along the alignment, and how far the window reaches to either side.
+    /// Place in m along the alignment.
     pub along_m: f64,
     /// Half the distance in m between the centres of the blocks, 0 for single rows.
     pub reach_m: f64,
@@ -37,7 +37,7 @@ pub struct BlockDifference {
     pub friction_pa: [f64; 3],
     /// Declared curve resistance in N/kN.
     pub curve_n_per_kn: f64,
-    /// Declared mass in kg with what is counted.
+    /// Declared mass in kg, with counted passengers.
     pub mass_kg: f64,
     /// Number of passengers, 0 where not counted.
     pub passengers: f64,

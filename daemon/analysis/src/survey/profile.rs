@@ -1,9 +1,9 @@
 //! The height profile from the balance of forces over all passes.
 //!
-//! Heights at nodes 10 m apart are unknown, with a random walk of the gradient between them
-//! (Wahba 1978: a smoothing spline is such a prior); resistance, mass and the time offset of the
-//! forces are estimated jointly with them. The heights make a banded system, the few common unknowns
-//! its border; the mass of each pass is fitted in turns, so that work grows linearly with passes.
+//! Heights at nodes 10 m apart are unknown, with a random walk of the gradient between them (Wahba 1978: a smoothing
+//! spline is such a prior); resistance, mass and the time offset of the forces are estimated jointly with them. The
+//! heights make a banded system, the few common unknowns its border; the mass of each pass is fitted in turns, so that
+//! the work grows linearly with the number of passes.
 
 use super::banded::NotPositive;
 use super::common::{Common, GRAVITY_MPS2, Prior};
@@ -12,20 +12,19 @@ use super::observation::BlockDifference;
 use crate::parallel;
 use crate::statistics::middle;
 
-/// Standard deviation in m of a row of GNSS altitude: far more than it errs, since its errors
-/// last for minutes.
+/// Standard deviation in m of a row of GNSS altitude: far more than its usual error, since errors last for minutes.
 const ALTITUDE_STD_M: f64 = 15.0;
-/// Standard deviation of a gradient of which nothing is known.
+/// Standard deviation of a gradient before the data.
 const GRADIENT_STD: f64 = 0.05;
 /// Standard deviation of a pass's mass around the declared one, as a share.
 const PASS_MASS_STD: f64 = 0.03;
-/// Rounds of linearising, weighing and fitting the passes' masses.
+/// Number of rounds that linearise, weigh and fit the passes' masses.
 const ROUNDS: usize = 8;
 /// Degrees of freedom of the residuals' distribution.
 const TAIL: f64 = 4.0;
 /// Largest number of passes that counts as few.
 const FEW_PASSES: usize = 100;
-/// Observations that one thread takes at a time.
+/// Number of observations that one thread takes at a time.
 const CHUNK: usize = 65_536;
 
 /// An altitude that GNSS gave.
@@ -88,8 +87,8 @@ pub struct HeightProfile {
 /// Which observations count.
 pub type Fold<'f> = &'f (dyn Fn(&BlockDifference) -> bool + Sync);
 
-/// Returns whether a pass is one of the few, evenly chosen and of both directions alike, that show what is a property
-/// of the line or of the recording, and no number to be averaged.
+/// Returns whether a pass is one of the few, evenly chosen and of both directions alike, that show a property of the
+/// line or of the recordings which needs no average over all passes.
 pub fn is_one_of_few(pass: usize, passes: usize) -> bool {
     // Both directions of a line come in turns.
     (pass / 2).is_multiple_of(one_in(passes))

@@ -1,4 +1,4 @@
-//! A raw recording, the quantities computed from it once, and cutting it where it turns back on its own path.
+//! A raw recording, the quantities computed from it once, and its division where it turns back on its own path.
 
 use std::collections::HashMap;
 
@@ -7,7 +7,7 @@ use dynocar_model::terms::wheel::STILL_MPS;
 use super::geodesy::{LocalPlane, between, distance_squared};
 use crate::statistics::middle;
 
-/// Fixes closer in time than this many s say the same: their errors fade over seconds.
+/// Least time in s between fixes that are used: closer ones have the same error, which fades over seconds.
 const FIX_STEP_MIN_S: f64 = 0.95;
 
 /// Rows of a recorder in order of time; a missing value is `NaN`.
@@ -33,8 +33,7 @@ pub struct RawRecording {
     pub altitude_m: Vec<f64>,
     /// 1 while a door is open; empty when not recorded.
     pub door_open: Vec<f64>,
-    /// Declared gross mass in kg with what is counted or weighed; `NaN` where the count is not known
-    /// yet.
+    /// Declared gross mass in kg, weighed or with counted passengers; `NaN` while the count is not known.
     pub mass_kg: Vec<f64>,
     /// Number of passengers; empty when not counted.
     pub passengers: Vec<f64>,

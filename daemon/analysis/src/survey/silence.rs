@@ -1,11 +1,11 @@
-//! Gaps of a receiver, filled with the path of another pass.
+//! Gaps of a receiver's fixes, filled with the path of another pass.
 
 use super::geodesy::distance_squared;
 use super::recording::{RecordingPart, SAME_ALIGNMENT_M, SurveyRecording};
 
-/// Fixes further apart along the path than this many m leave it open in between.
+/// Distance in m between fixes along the path above which the path between them is open.
 pub const GAP_MAX_M: f64 = 150.0;
-/// A path around is at most this many times as long as the straight line between its ends.
+/// Greatest length of a path that fills a gap, as a multiple of the straight line between its ends.
 const DETOUR_MAX: f64 = 3.0;
 
 /// A point on the path of a part.
@@ -13,7 +13,7 @@ const DETOUR_MAX: f64 = 3.0;
 pub struct TracePoint {
     /// East and north in m.
     pub at_m: [f64; 2],
-    /// True where no fix says so, only a straight line over a silence.
+    /// True where no fix shows the point, only a straight line over a gap.
     pub is_open: bool,
 }
 
@@ -35,8 +35,8 @@ pub fn trace(part: &RecordingPart, recordings: &[SurveyRecording], step_m: f64) 
     within.map(|(travelled_m, at_m)| TracePoint { at_m, is_open: is_open(travelled_m) }).collect()
 }
 
-/// Returns the path of one trace, with what it leaves open taken from others, whichever is the shortest path
-/// between the ends of the silence. Where no other knows, the straight line stays.
+/// Returns the path of one trace, with its gaps filled from the other traces by the shortest path between the ends of
+/// each gap. A gap that no other trace covers stays a straight line.
 pub fn filled(one: usize, traces: &[Vec<TracePoint>]) -> Vec<[f64; 2]> {
     let own = &traces[one];
     let mut path: Vec<[f64; 2]> = Vec::with_capacity(own.len());
@@ -62,8 +62,8 @@ pub fn filled(one: usize, traces: &[Vec<TracePoint>]) -> Vec<[f64; 2]> {
     path
 }
 
-/// Length in m and points of the path of a trace between two places, in whichever direction it drives;
-/// `None` where it does not know it itself.
+/// Returns the length in m and the points of a trace's path between two places, driven in either direction; `None`
+/// where the trace itself has a gap there.
 fn between(ends: [[f64; 2]; 2], trace: &[TracePoint]) -> Option<(f64, Vec<[f64; 2]>)> {
     let nearest = |place: [f64; 2]| {
         let distances =
@@ -101,7 +101,7 @@ mod tests {
         (0..79).map(point).collect()
     }
 
-    /// Returns the same with a straight line over what is open.
+    /// Returns the same with a straight line over the open points.
     fn silent(open: std::ops::Range<usize>) -> Vec<TracePoint> {
         let mut trace = quarter(0.0, open.clone());
         let (from, to) = (trace[open.start - 1].at_m, trace[open.end].at_m);

@@ -6,11 +6,11 @@ use serde::Serialize;
 use super::recording::RawRecording;
 use crate::statistics::least_first;
 
-/// A shorter stand in s without open doors is no stop.
+/// Least time in s of a stop without open doors.
 const STAND_MIN_S: f64 = 8.0;
-/// Stands nearer than this many m are at the same stop.
+/// Greatest distance in m between stands at the same stop.
 const SAME_STOP_M: f64 = 25.0;
-/// Share of the passes that stand at a stop.
+/// Least share of the passes that stand at a stop.
 const SHARE_MIN: f64 = 0.5;
 
 /// A stop of the line.
@@ -20,7 +20,7 @@ pub struct SurveyedStop {
     pub chainage_m: f64,
     /// Name, empty where not known.
     pub name: String,
-    /// How stands scatter in m; absent for one.
+    /// Standard deviation in m of the stands; absent for one stand.
     pub std_m: Option<f64>,
     /// Direction of travel.
     pub direction: i8,

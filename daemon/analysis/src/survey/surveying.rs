@@ -1,4 +1,4 @@
-//! The survey as a whole.
+//! The whole survey, step by step.
 
 use super::alignment::{FoundCurve, curves, turning_rad};
 use super::banded::NotPositive;
@@ -16,16 +16,16 @@ use super::trips::{NotUsed, Trip, not_used, trips};
 use crate::parallel;
 use crate::statistics::rms;
 
-/// Lateral uncertainty in m of an alignment: what the wheels roll differs from it by so much times the
-/// turning.
+/// Lateral uncertainty in m of an alignment: the distance that the wheels roll differs from its length by this times
+/// the turning.
 const LATERAL_STD_M: f64 = 1.5;
-/// Trains that start or stop at an end of the line are seen this many m beyond it.
+/// Distance in m beyond an end of the line within which trains that start or stop there are used.
 const ENDS_M: f64 = 60.0;
-/// Altitudes are taken every this many m.
+/// Distance in m between the altitudes that are used.
 const ALTITUDE_STEP_M: f64 = 50.0;
 /// Lengths in s of blocks that are tried.
 const BLOCKS_S: [f64; 3] = [1.0, 2.0, 4.0];
-/// Residuals that alternate more than this are the speed's noise: blocks are lengthened.
+/// Autocorrelation of the residuals below which they are noise of the speed: then the blocks are lengthened.
 const ALTERNATING: f64 = -0.3;
 
 /// Declared vehicle.
@@ -71,7 +71,7 @@ pub enum SurveyError {
 /// Profile from the balance of forces.
 #[derive(Clone, Debug)]
 pub struct SurveyedProfile {
-    /// The profile and what belongs to it.
+    /// The profile with the results of its estimation.
     pub learned: LearnedProfile,
     /// Curves of the growing alignment.
     pub curves: Vec<FoundCurve>,

@@ -7,15 +7,15 @@ use crate::statistics::least_first;
 
 /// Window in m around the expected chainage in which a fix is placed.
 const WINDOW_M: f64 = 60.0;
-/// Share of a difference by which the expectation follows the fixes.
+/// Share of a difference by which the expected chainage follows the fixes.
 const FOLLOWING: f64 = 0.1;
-/// A recording that was not near the alignment for this many m has left it.
+/// Distance in m away from the alignment after which a recording has left it.
 const LEFT_AFTER_M: f64 = 300.0;
-/// Distance in m over which a recording is looked for on an alignment.
+/// Distance in m over which a recording is compared with an alignment to find it there.
 const SEARCH_M: f64 = 400.0;
 /// Width in m of the bins in which offsets are counted.
 const BIN_M: f64 = 20.0;
-/// A recording that runs on past the end of an alignment by this many m has left it.
+/// Distance in m beyond the end of an alignment after which a recording has left it.
 const BEYOND_M: f64 = 30.0;
 
 /// A fix placed on an alignment.
@@ -88,8 +88,8 @@ fn follow_from(
     (placed, fixes.len())
 }
 
-/// Returns the first fix from which on a recording follows an alignment for a while, and what its alignment lacks of
-/// the chainage in m.
+/// Returns the first fix from which a recording follows an alignment for a while, and the difference in m between
+/// chainage and distance travelled there.
 fn found(
     recording: &SurveyRecording,
     fixes: &[Fix],
@@ -132,8 +132,8 @@ fn found(
     None
 }
 
-/// Returns the possible error of a fix's alignment in the chainage in m: for each place of the alignment beside
-/// which it is and in whose direction it moves; `None` while it stands.
+/// Returns the differences in m between chainage and distance travelled that a fix may have: one for each place of the
+/// alignment near the fix where it moves along the alignment; `None` while it stands.
 fn offsets(
     recording: &SurveyRecording,
     fixes: &[Fix],

@@ -12,11 +12,11 @@ use super::tracking::{PlacedFix, follow};
 use crate::explain::answer::WithStd;
 use crate::parallel;
 
-/// A trip reaches beyond its first and last fix by this many m and s: it stands there.
+/// Distance in m and time in s by which a trip reaches beyond its first and last fix, where the train stands.
 const REACH: (f64, f64) = (30.0, 60.0);
 /// Shortest unused part in s that is reported.
 const NOT_USED_MIN_S: f64 = 5.0;
-/// Wheels of one vehicle differ so little from pass to pass.
+/// Standard deviation of the wheels' scale between passes of one vehicle.
 const SCALE_SPREAD: f64 = 0.001;
 
 /// A one-way trip along the line.
@@ -58,14 +58,14 @@ pub struct NotUsed {
     pub reason: &'static str,
 }
 
-/// A pass on its alignment, with what it shows by itself.
+/// A pass on its alignment, with the scale and the lag that it shows by itself.
 struct PlacedPass {
     rows: Range<usize>,
     fixes: Vec<PlacedFix>,
     learned: WheelsAndLag,
 }
 
-/// Gives every pass its chainage; what the fit runs show of wheels and lag comes with it.
+/// Gives every pass its chainage; returns the trips, and the scale and the lag by the fit runs.
 pub fn trips(
     passes: &[SurveyPass],
     alignments: &Alignments,

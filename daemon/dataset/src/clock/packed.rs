@@ -12,7 +12,7 @@ pub struct Packed {
     is_date: bool,
     is_short_date: bool,
     last: f64,
-    /// How often the seconds began anew.
+    /// Number of times that the seconds began anew.
     minutes: usize,
 }
 

@@ -1,4 +1,4 @@
-//! Assignment of columns to quantities, those of forces by their signs.
+//! Assignment of columns to quantities, of forces by their signs.
 
 use std::cmp::Reverse;
 
@@ -9,9 +9,9 @@ use super::matching::{UNKNOWN_UNIT, are_alike, can_hold, consider, figures};
 use super::name::named_unit;
 use crate::{DatasetError, Quantity, SourcePosition};
 
-/// Logarithm of the ratio of a position's span and the integrated speed that gaps and wear explain.
+/// Logarithm of the ratio of a position's span to the integrated speed that gaps and wear explain.
 const SPAN_MISFIT: f64 = 0.2;
-/// A column whose name says less than another's by no more than this could be it as well.
+/// Greatest difference between the scores of two columns that could both be the quantity.
 const NEAR: i32 = 25;
 
 /// A column that may hold a quantity.
@@ -19,9 +19,9 @@ const NEAR: i32 = 25;
 struct Candidate {
     /// Index of the column.
     column: usize,
-    /// The greater the likelier.
+    /// Score; a greater one is likelier.
     score: i32,
-    /// Guessed column; the first reason is the word in the name that speaks for it.
+    /// Guessed column; the first reason is the word in the name that indicates the quantity.
     guessed: GuessedColumn,
 }
 
@@ -51,11 +51,11 @@ pub struct Assignment<'c> {
 }
 
 impl<'c> Assignment<'c> {
-    /// Takes the declaration for granted, and for every other quantity the column that most speaks for.
+    /// Assigns the declared columns as given, and to every other quantity the column with the best score.
     ///
     /// # Errors
     ///
-    /// Where what is declared cannot be.
+    /// When a declared column cannot hold its quantity.
     pub fn new(
         columns: &'c InspectedColumns,
         given: &[GivenColumn],
@@ -138,8 +138,8 @@ impl<'c> Assignment<'c> {
         }
     }
 
-    /// Takes columns for parts that add up where they are alike but for what numbers them, and doubts what another
-    /// column could be as well.
+    /// Takes columns as parts that add up where their names differ only in the number of the part, and adds a doubt
+    /// where another column could be the quantity as well.
     fn weigh_others(&mut self) {
         for place in 0..self.taken.len() {
             let AssignedColumn { index, guessed, is_given } = &self.taken[place];
@@ -226,8 +226,8 @@ impl<'c> Assignment<'c> {
         self.taken_for(quantity).map(|it| &self.columns[it.index].all)
     }
 
-    /// Takes the column for the position that spans what the speed says, where another does not and more speaks for
-    /// its name.
+    /// Takes as position the column whose span fits the integrated speed, where the column with the better name does
+    /// not fit.
     pub fn weigh_positions(&mut self) {
         let Some(taken) = self.taken_for(Quantity::Position).filter(|it| !it.is_given).cloned()
         else {
@@ -269,7 +269,7 @@ impl<'c> Assignment<'c> {
         self.taken.push(AssignedColumn { index, guessed, is_given: false });
     }
 
-    /// Takes a quantity's column for another quantity instead, with a doubt; what was declared stays.
+    /// Takes a quantity's column for another quantity instead, with a doubt; a declared column stays.
     pub fn rename(&mut self, from: Quantity, to: Quantity, doubt: &str) {
         for AssignedColumn { guessed, is_given, .. } in &mut self.taken {
             if guessed.quantity == from && !*is_given {
@@ -280,7 +280,7 @@ impl<'c> Assignment<'c> {
         }
     }
 
-    /// Takes a quantity's column for nothing; what was declared stays.
+    /// Drops a quantity's column; a declared column stays.
     pub fn drop(&mut self, quantity: Quantity, reason: &str) {
         let is_it = |it: &mut AssignedColumn| it.guessed.quantity == quantity && !it.is_given;
         let left_out = self.taken.extract_if(.., is_it);
@@ -308,7 +308,7 @@ impl<'c> Assignment<'c> {
         self.columns[index].name.shown()
     }
 
-    /// Returns the columns that hold a quantity, with what was not taken for it, and the others.
+    /// Returns the columns that hold a quantity, each with the alternatives that were rejected, and the other columns.
     pub fn finish(mut self) -> (Vec<GuessedColumn>, Vec<Unmapped>) {
         for place in 0..self.taken.len() {
             let more = self.not_taken(self.taken[place].index, self.taken[place].guessed.quantity);

@@ -19,14 +19,14 @@ pub struct InspectedColumn {
     pub facts: Vec<Facts>,
     /// Facts on its values in all files.
     pub all: Facts,
-    /// Why it can be mapped to nothing, whatever it holds.
+    /// Why it cannot be mapped to any quantity, regardless of its values.
     pub unusable: Option<String>,
 }
 
 /// All files, read through.
 #[derive(Clone, Debug)]
 pub struct InspectedColumns {
-    /// How the first file's text falls into cells, as that of all.
+    /// Layout of the first file's text, which holds for all files.
     pub layout: GuessedLayout,
     /// The columns, in the order of the first file's header.
     pub columns: Vec<InspectedColumn>,

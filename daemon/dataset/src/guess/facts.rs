@@ -143,7 +143,7 @@ impl Facts {
         self.clocks.iter().map(DayClock::format).collect()
     }
 
-    /// Takes in a cell's number; what is not finite is missing.
+    /// Adds a cell's number; a value that is not finite counts as missing.
     pub fn push(&mut self, value: f64) {
         if !value.is_finite() {
             return;
@@ -173,7 +173,7 @@ impl Facts {
         self.text.get_or_insert_with(|| TextCell { file: String::new(), line, cell: cell() });
     }
 
-    /// Takes in what was seen of the same column in another file.
+    /// Adds the facts on the same column in another file.
     pub fn merge(&mut self, other: &Facts) {
         match self.numbers {
             0 => self.clocks.clone_from(&other.clocks),

@@ -26,9 +26,9 @@ pub struct GivenColumn {
     pub quantity: Quantity,
     /// Its name in the header.
     pub column: String,
-    /// Its unit; `None` where name and values are to reveal it.
+    /// Its unit; `None` where name and values must reveal it.
     pub unit: Option<Unit>,
-    /// How its cells are written, where they are times and that is said.
+    /// Format of its cells, where they are times and the user states it.
     pub format: Option<TimeFormat>,
 }
 
@@ -45,7 +45,7 @@ pub struct Guess {
     pub runs: Vec<GuessedRun>,
 }
 
-/// A column and what it is taken for.
+/// A column and the quantity that it is taken for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GuessedColumn {
     /// Quantity of the column.
@@ -100,8 +100,7 @@ impl Guess {
 }
 
 impl GuessedColumn {
-    /// Returns a column by its name and what its values are like, in a unit that is given, or by the one that its name
-    /// says.
+    /// Returns a column by its name and the facts on its values, in a unit that is given, or that its name states.
     pub(super) fn new(
         (name, facts): (&Name, &Facts),
         quantity: Quantity,
@@ -247,7 +246,7 @@ impl Guess {
     }
 }
 
-/// Returns true for what the balance of forces shows.
+/// Returns true for a fault that only the balance of forces shows.
 fn needs_balance(fault: InputFault) -> bool {
     matches!(
         fault,

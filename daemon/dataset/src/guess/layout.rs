@@ -1,4 +1,4 @@
-//! Splitting a file's text into cells: delimiter, decimal mark, the lines above the names, names and units.
+//! Division of a file's text into cells: delimiter, decimal mark, the lines above the names, names and units.
 use dynocar_model::units::is_unit;
 
 use super::name::Name;
@@ -17,10 +17,10 @@ const TYPES: &str = "double float real single date int integer uint long number 
 /// Number of rows that show the layout.
 const ROWS_MAX: usize = 200;
 
-/// How a file's text falls into cells.
+/// How a file's text is divided into cells.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GuessedLayout {
-    /// As a dataset says it.
+    /// The layout in the terms of a dataset.
     pub text: TextLayout,
     /// The columns' names, with the units that stand below them.
     pub header: Vec<Name>,
@@ -130,7 +130,7 @@ impl Row {
         2 * self.values() > self.filled().count()
     }
 
-    /// Returns true for words: names, units. The unit of a share is 1; what is missing among values may be a name.
+    /// Returns true for words: names, units. The unit of a share is 1; a word for a missing value may be a name.
     fn is_of_words(&self) -> bool {
         let mut own = self.filled().filter(|cell| *cell != "1").peekable();
         own.peek().is_some() && !own.any(|cell| is_value(cell) && !is_missing(cell))

@@ -19,7 +19,7 @@ pub struct MarkEvidence {
 }
 
 impl MarkEvidence {
-    /// Takes in the rows of a text below the lines above them.
+    /// Adds the evidence of a text's rows, without the lines above them.
     pub fn push_text(&mut self, text: &str, delimiter: u8, lines_above: usize) {
         let mut reader = RowReader::new(text, delimiter, b'.');
         let (mut row, mut rows) = (CellRow::default(), 0);

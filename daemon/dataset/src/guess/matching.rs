@@ -9,18 +9,18 @@ use super::vocabulary::{TermWeight, VOCABULARY, listed, terms};
 use crate::Quantity;
 use crate::error::nearest;
 
-/// Weight of a name that says the quantity and nothing else.
+/// Score of a name that states the quantity and nothing else.
 const SAID: i32 = 100;
-/// A name below this is no sign of the quantity.
+/// Score below which a name is no sign of the quantity.
 const ENOUGH: i32 = 45;
-/// A name below this is a doubtful sign.
+/// Score below which a name is a doubtful sign.
 const SURE: i32 = 65;
-/// One cell of text among more than this many numbers is a mistake in the file.
+/// Number of numbers above which a single cell of text among them is a mistake in the file.
 const TEXTS_RARE: usize = 50;
-/// Terms of at least this many letters are found within a longer word, too.
+/// Least number of letters of a term that is found within a longer word, too.
 const WITHIN_MIN: usize = 6;
 
-/// How a reason begins that is an unknown unit.
+/// Beginning of a reason that is an unknown unit.
 pub const UNKNOWN_UNIT: &str = "there is no unit ";
 
 /// Match of a name with a quantity.
@@ -111,12 +111,12 @@ pub fn can_hold(facts: &Facts, quantity: Quantity) -> Result<(), String> {
     }
 }
 
-/// Returns a column of times, whatever its name.
+/// Returns the match of a column whose cells are times, with any name.
 fn by_cells() -> Match {
     Match { score: SURE, reason: "what it holds".into(), unit: None }
 }
 
-/// Returns the best that a name says of a quantity, or what in it speaks against it.
+/// Returns the best match of a name with a quantity, or the contradiction in the name.
 fn by_name(name: &Name, quantity: Quantity) -> Option<Result<Match, String>> {
     let best = readings(name, quantity)
         .into_iter()
@@ -224,8 +224,8 @@ fn by_likeness(words: &[String], quantity: Quantity) -> Option<(i32, String)> {
     (is_meant && is_alike).then(|| (50, format!("that the name is like '{nearest}'")))
 }
 
-/// Returns a column of which only the unit speaks: of what trains record in km/h it is the speed; and T is
-/// a temperature beside the unit of one.
+/// Returns a match for which only the unit speaks: a column in km/h is the speed, and T in a unit of temperature is a
+/// temperature.
 fn by_unit_alone(name: &Name, quantity: Quantity) -> Option<Match> {
     let unit = Unit::spelled(quantity.dimension(), name.unit.as_ref()?)?;
     let is_known = match quantity {

@@ -1,17 +1,15 @@
-//! A description of recordings that nobody has described yet: which column is which quantity, in
-//! which unit.
+//! A description of recordings that nobody has described yet: the quantity and the unit of each column.
 //!
-//! Names give the quantity, names or values the unit. Nothing is taken silently: every guess says
-//! what speaks for it, what makes it doubtful and what was not taken; what says nothing is left
-//! out. How trains move ([`Guess::correct`]) has the last word about a unit that no name gives.
+//! Names give the quantity, names or values the unit. Nothing is assumed silently: every guess states its reasons, its
+//! doubts and the rejected alternatives; a column without any sign of a quantity is left out. The motion of trains
+//! ([`Guess::correct`]) decides last about a unit that no name gives.
 //!
 //! # Layout, in the order of the work
 //!
 //! - `layout`, `columns`, `facts`: delimiter, decimal mark, names and units; facts on the values
-//! - `marks`: which marks stand in numbers
-//! - `name`, `vocabulary`: a name in words, units as people write them, what recorders
-//!   call the quantities
-//! - `matching`, `plausible`: which quantity a column speaks for, and its likeliest unit
+//! - `marks`: the marks in numbers
+//! - `name`, `vocabulary`: a name in words, units as people write them, recorders' names of the quantities
+//! - `matching`, `plausible`: the score of a column for each quantity, and its likeliest unit
 //! - `assignment`: one column for each quantity
 //! - [`guessed`]: the guess, and its correction
 
@@ -41,8 +39,7 @@ use assignment::Assignment;
 /// A force with more than this share of values below zero is signed.
 const SIGNED_SHARE: f64 = 0.02;
 
-/// Guesses the description of recordings that are laid out alike, and takes what is declared for
-/// granted.
+/// Guesses the description of recordings with the same layout; declared columns stay as given.
 ///
 /// # Errors
 ///
@@ -105,8 +102,7 @@ fn unit_names(quantity: Quantity) -> String {
     names.join(", ")
 }
 
-/// Settles what a dataset cannot have at once: a signed force beside one that is never negative, a
-/// handle beside a force.
+/// Resolves pairs that a dataset cannot have: a signed force and one that is never negative, a handle and a force.
 fn settle(assignment: &mut Assignment) {
     use Quantity::{BrakeForce, BrakeHandle, ControlForce, TractionForce, TractionHandle};
     let is_signed = |assignment: &Assignment, quantity| {

@@ -6,22 +6,22 @@ use super::vocabulary::{VOCABULARY, is_word, listed};
 
 use crate::Quantity;
 
-/// A column's name, taken apart.
+/// A column's name, divided into words and unit.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Name {
     /// As in the header, without surrounding spaces.
     pub text: String,
     /// Its words in small letters, without the unit in brackets.
     pub words: Vec<String>,
-    /// The unit that the name gives in brackets or behind a stroke, as written.
+    /// The unit that the name gives in brackets or after a slash, as written.
     pub unit: Option<String>,
 }
 
 impl Name {
-    /// Takes a name apart: `F_trac [kN]` is f, trac and the unit kN.
+    /// Divides a name: `F_trac [kN]` is f, trac and the unit kN.
     pub fn parse(text: &str) -> Self {
         let text = text.trim();
-        // Recorders of buses write the source behind a stroke: `speed\CAN1:1`.
+        // Recorders of buses write the source after a backslash: `speed\CAN1:1`.
         let is_source = |it: &str| it.contains(':') && it.ends_with(|it: char| it.is_ascii_digit());
         let own = text.rsplit_once('\\').filter(|it| is_source(it.1)).map_or(text, |it| it.0);
         let (rest, unit) = split_unit(own);
@@ -33,7 +33,7 @@ impl Name {
         Name { unit: self.unit.or(unit), ..self }
     }
 
-    /// Returns the words without what numbers a part of a whole; `None` where nothing does.
+    /// Returns the words without those that number a part of a whole; `None` where no word does, or all do.
     pub fn without_number(&self) -> Option<Vec<&str>> {
         let is_letter = |word: &str| matches!(word, "a" | "b" | "c" | "d");
         let is_number = |word: &&str| {
@@ -104,8 +104,8 @@ fn split_unit(text: &str) -> (String, Option<String>) {
     (text.into(), None)
 }
 
-/// Returns true for what stands in brackets as units do and is none that is known: a word in square ones, and in others
-/// what is written with a unit's marks.
+/// Returns true for text in brackets that looks like a unit, although it is not a known one: a word in square brackets,
+/// and in others text with a unit's marks.
 fn looks_like_unit(inside: &str, open: char) -> bool {
     let inside = inside.trim();
     let has_mark = inside.contains(['/', '·', '*', '^', '²', '³', '⁻']);

@@ -1,4 +1,4 @@
-//! The unit by which a column's values are those of a train.
+//! Unit in which a column's values are those of a train.
 
 use dynocar_model::units::Unit;
 
@@ -6,7 +6,7 @@ use super::facts::Facts;
 use super::vocabulary::{Measure, Usual, usual};
 use crate::Quantity;
 
-/// Values this many times beyond the usual ones are not of a quantity in a unit.
+/// Factor beyond the usual values above which values are not of a quantity in a unit.
 const FAR: f64 = 20.0;
 /// Some 3000 years in s.
 const TIME_MAX_S: f64 = 1e11;
@@ -15,7 +15,7 @@ const JULIAN_DAYS: std::ops::Range<f64> = 2.4e6..2.5e6;
 /// The factor of recorders that write counts of a thousandth.
 const RAW_COUNT: f64 = 1e-3;
 
-/// A unit for a column, and how sure it is.
+/// A unit for a column, with its reason and any doubt.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UnitChoice {
     /// The unit of `cell * scale`.
@@ -24,12 +24,12 @@ pub struct UnitChoice {
     pub scale: f64,
     /// Reason for it.
     pub reason: String,
-    /// Doubt about it; `None` where the header says it and the values agree.
+    /// Doubt about it; `None` where the header states it and the values agree.
     pub doubt: Option<String>,
 }
 
 impl Usual {
-    /// Returns the figure that reveals a column's unit, and what it is in words; `None` where it reveals nothing.
+    /// Returns the figure that reveals a column's unit, with its description in words; `None` where it reveals nothing.
     fn figure(&self, facts: &Facts) -> Option<(f64, String)> {
         let (words, figure) = match self.measure {
             Measure::Top => ("values up to", facts.top()),
@@ -41,7 +41,8 @@ impl Usual {
         Some((figure, format!("{words} {}", number(figure))))
     }
 
-    /// Returns how far a value in the base unit is from what is usual, as a factor's logarithm; 0 within.
+    /// Returns the distance of a value in the base unit from the usual range, as a factor's logarithm; 0 within the
+    /// range.
     fn distance(&self, base: f64) -> f64 {
         if (self.low..=self.high).contains(&base) {
             return 0.0;

@@ -26,7 +26,7 @@ fn run() -> Vec<[f64; 5]> {
     rows
 }
 
-/// A file: a header and, for each column, what a row says there.
+/// Returns a file: a header and, for each row, a cell for each column.
 fn file(header: &str, cells: impl Fn(&[f64; 5]) -> Vec<String>) -> String {
     let delimiter = if header.contains(';') { ";" } else { "," };
     let rows = run();

@@ -8,16 +8,16 @@ use serde::Deserialize;
 
 use crate::Quantity;
 
-/// How far a term can be trusted.
+/// Weight of a term as evidence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TermWeight {
-    /// Says the quantity among other words too.
+    /// It names the quantity among other words too.
     Named,
-    /// Says it where nothing else of weight is said: `brake` may go on as `brake disc wear`.
+    /// It names the quantity unless another word has weight: `brake` may go on as `brake disc wear`.
     Alone,
     /// A letter of formulas or an abbreviation.
     Symbol,
-    /// May well be another thing's: a train has more pressures than one.
+    /// It may belong to another quantity: a train has several pressures.
     Weak,
 }
 
@@ -34,17 +34,17 @@ pub struct Vocabulary {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NonQuantityWords {
-    /// They change nothing of what a column is.
+    /// Words that do not change the meaning of a column.
     pub neutral: String,
     /// They number the parts of a whole.
     pub parts: String,
     /// The parts of a train.
     pub vehicles: String,
-    /// Of what was wanted or allowed instead of what was measured.
+    /// Words for wanted or allowed values instead of measured ones.
     pub not_measured: String,
-    /// Of what is said of a measurement instead of it.
+    /// Words for a statement on a measurement instead of its value.
     pub about: String,
-    /// Of things that have a temperature, a pressure, a speed … of their own.
+    /// Words for things that have a temperature, a pressure, a speed … of their own.
     pub other_things: String,
 }
 

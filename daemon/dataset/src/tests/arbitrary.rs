@@ -1,4 +1,4 @@
-//! Whatever a file holds.
+//! Files with arbitrary contents.
 
 use proptest::prelude::*;
 

@@ -1,4 +1,4 @@
-//! Runs without what makes a run.
+//! Runs that lack essential contents.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! Forces that act later than reported, both or the brake alone: a dead time, then a first-order lag.
+//! Forces that act later than reported, traction and brake or the brake alone: a dead time, then a first-order lag.
 
 use dynocar_model::terms::{Key, delay, speed_delay};
 use dynocar_shared::vocabulary::EffectKind;
@@ -11,7 +11,7 @@ use super::{
 use crate::explain::evidence::SampleForces;
 use crate::explain::scan::Scan;
 
-/// Delay and lag in s that a fit may start from.
+/// Delays and lags in s from which a fit may start.
 const STARTS: [[f64; 2]; 4] = [[0.3, 0.3], [1.0, 1.0], [0.2, 2.0], [2.0, 0.3]];
 
 #[derive(Debug)]

@@ -1,4 +1,4 @@
-//! Basic resistance that follows the outside temperature: w0 (1 + beta (T - reference)).
+//! Basic resistance that depends on the outside temperature: w0 (1 + beta (T - reference)).
 
 use dynocar_model::terms::extra::Covariate;
 use dynocar_model::terms::{ModelEntry, ambient};
@@ -27,10 +27,10 @@ fn mean_degc(run: &RunData) -> Option<f64> {
     (count > 0).then(|| sum / f64::from(count))
 }
 
-/// It is one number a run, and each run has its load and wind, which follow some temperature by chance.
+/// Each run has one temperature, and also its load and wind, which may follow the temperatures by chance.
 pub const POLICY: Policy = Policy { certainty: Certainty::BesideUsualErrors, ..Policy::USUAL };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     let means: Option<Vec<f64>> = scan.problem.runs.iter().map(mean_degc).collect();
     let Some(means) = means else {

@@ -1,4 +1,4 @@
-//! Cold bearings that warm up.
+//! Cold bearings, whose resistance falls as they warm up.
 
 use dynocar_model::terms::extra::Covariate;
 use dynocar_model::terms::{Resistance, bearings};
@@ -14,7 +14,7 @@ struct Warming;
 /// It estimates a figure that is usually a little wrong.
 pub const POLICY: Policy = Policy { frees: &[DeclaredFigure::Warming], ..Policy::USUAL };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     let longest_s = scan.problem.runs.iter().map(RunData::duration_s).fold(0.0, f64::max);
     if longest_s < 240.0 {

@@ -1,4 +1,4 @@
-//! Curve resistance k/R in N/kN with another k than declared (Röckl, Schmidt; declared k = 600).
+//! Curve resistance k/R in N/kN with another constant k than declared (Röckl, Schmidt; usually declared as 600).
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::curve;
@@ -18,7 +18,7 @@ struct Curves {
 /// It estimates a figure that is usually a little wrong.
 pub const POLICY: Policy = Policy { frees: &[DeclaredFigure::Curves], ..Policy::USUAL };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     let in_curve_s = scan
         .seconds_where(|_, sample| sample.curvature_per_m.is_some_and(|curvature| curvature > 0.0));

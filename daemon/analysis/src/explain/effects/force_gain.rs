@@ -1,4 +1,4 @@
-//! A reported force that is not the true one, traction or brake: gain = reported over true.
+//! A reported traction or brake force that differs from the true one: gain = reported over true.
 
 use dynocar_model::terms::{Key, brake, traction};
 use dynocar_shared::vocabulary::EffectKind;
@@ -16,14 +16,14 @@ enum Gain {
     Brake,
 }
 
-/// Force sensors are a little off: an error of the record that every train has.
+/// Force sensors have small errors: an error of the record that every train has.
 pub const OF_TRACTION: Policy = Policy {
     is_sought_beside_usual_errors: false,
     everyday: Some(Everyday { rank: 3, most: f64::INFINITY }),
     frees: &[DeclaredFigure::Traction],
     ..Policy::USUAL
 };
-/// The usual errors hold a scale of the brake, and a larger one is no small error.
+/// The usual errors contain a scale of the brake, and a larger one is no small error.
 pub const OF_BRAKE: Policy = Policy {
     is_sought_beside_usual_errors: false,
     frees: &[DeclaredFigure::Brake],

@@ -1,13 +1,11 @@
-//! A declared gradient that is wrong by a function of the chainage: the same in every passage, with
-//! opposite forces in the two directions, or of each direction its own where they have alignments of
-//! their own.
+//! A declared gradient that is wrong by a function of the chainage. The error is the same in every passage and acts
+//! with opposite signs in the two directions; directions with alignments of their own each have an error of their own.
 //!
-//! The function is linear between nodes. Before the data it is a Gaussian process whose
-//! correlation falls exponentially along the line, so that the nodes are a linear Gaussian block
-//! of the fit; the exponential makes their information tridiagonal (Rasmussen and Williams 2006,
-//! appendix B: the Ornstein-Uhlenbeck process). How large it is and how fast it changes are those
-//! of a map's errors or, where a level line is declared, of a line that nobody surveyed: their
-//! evidence decides.
+//! The function is linear between nodes. Its prior is a Gaussian process whose correlation falls exponentially along
+//! the line, so that the nodes are a linear Gaussian block of the fit; the exponential makes their information
+//! tridiagonal (Rasmussen and Williams 2006, appendix B: the Ornstein-Uhlenbeck process). The size of the error and the
+//! length over which it changes are those of a map's errors or, where a level line is declared, of a line that nobody
+//! surveyed; the evidence of the two decides.
 
 use dynocar_model::terms::extra::Covariate;
 use dynocar_model::terms::{ModelEntry, Parameter, gradient};
@@ -26,9 +24,9 @@ use crate::explain::places::{MAP_ERROR_PERMILLE, span_m};
 use crate::explain::scan::Scan;
 use crate::statistics::rms;
 
-/// Nodes in the length over which the error changes.
+/// Number of nodes in the length over which the error changes.
 const NODES_A_LENGTH: f64 = 3.0;
-/// Nodes at least, and at most.
+/// Least and greatest number of nodes.
 const NODES_MIN: f64 = 4.0;
 const NODES_MAX: f64 = 160.0;
 /// Least number of runs in which an effect tied to the line shows.
@@ -52,7 +50,7 @@ pub const POLICY: Policy = Policy {
     ..Policy::USUAL
 };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     let runs = &scan.problem.runs;
     let span_m = span_m(scan).filter(|_| scan.problem.positions.distance_ratio.is_some());
@@ -83,7 +81,7 @@ pub fn propose(scan: &Scan) -> Proposal {
     Ok(profiles.into_iter().map(candidate).collect())
 }
 
-/// The map's own small error, at none: no effect, but what the finished model is fitted beside.
+/// Returns the map's own small error, starting at zero: no effect, but an error that is in the finished model.
 pub fn map_error(span_m: [f64; 2], scale: ErrorScale) -> Candidate {
     let profile = Profile::new(span_m, scale, 1, false);
     let start = vec![0.0; profile.parameters.len()];

@@ -1,4 +1,4 @@
-//! A gradient profile that lies elsewhere than the map says: true gradient(x) = map(x - shift).
+//! A gradient profile that is shifted against the map: true gradient(x) = map(x - shift).
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use super::{Candidate, Hypothesis, Nature, On, OnOthers, Policy, Proposal};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 
-/// Shifts that a search starts from are this far apart in m.
+/// Distance in m between the shifts from which a search starts.
 const GRID_M: f64 = 25.0;
 
 #[derive(Debug)]
@@ -19,10 +19,10 @@ struct Shift {
     length_m: f64,
 }
 
-/// An error of the map, whose usual errors are in the model there.
+/// An error of the map: the usual errors already contain it.
 pub const POLICY: Policy = Policy { is_sought_beside_usual_errors: false, ..Policy::USUAL };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     let Some(hypothesis) = shift(scan) else {
         return Err("no gradient profile over the chainage".into());

@@ -1,4 +1,4 @@
-//! A dead time, then a first-order lag: what late forces and a late speed have in common.
+//! A dead time, then a first-order lag: the law of late forces and of a late speed.
 
 use dynocar_model::terms::Parameter;
 use dynocar_shared::HALF_95;
@@ -6,25 +6,25 @@ use dynocar_shared::HALF_95;
 use crate::explain::evidence::SampleForces;
 use crate::explain::hypothesis::{On, ReportContext, ReportedValues};
 
-/// Delay and lag in s near none: where a fit begins whose other starts are all worse than none.
+/// Delay and lag in s near zero, from which a fit begins when all other starts are worse than no effect.
 const NEAR_NONE_S: [f64; 2] = [0.05, 0.05];
 
-/// The delay and lag in s that a fit begins from: of some starts the one that explains most, given by how much each
-/// decreases the cost.
+/// Returns the delay and lag in s from which a fit begins: of some starts the one with the greatest decrease of the
+/// cost.
 pub fn late_from(starts_s: &[[f64; 2]], decrease: impl Fn([f64; 2]) -> f64) -> Vec<f64> {
     let each = starts_s.iter().map(|start_s| (decrease(*start_s), *start_s));
     let best = each.max_by(|one, other| one.0.total_cmp(&other.0));
     best.filter(|(decrease, _)| *decrease > 0.0).map_or(NEAR_NONE_S, |(_, start_s)| start_s).into()
 }
 
-/// Standard deviation in s of a dead time and of a lag by the sampling step. Between samples forces are taken to change
-/// evenly, so that each of the two may be off by any part of a step; their sum is known better.
+/// Returns the standard deviation in s of a dead time and of a lag by the sampling step. Forces are taken to change
+/// evenly between samples, so that each of the two may be wrong by any part of a step; their sum is known better.
 pub fn late_by_sampling_s(step_s: f64) -> f64 {
     step_s / 12_f64.sqrt()
 }
 
-/// A dead time and a lag, each with its standard deviation: neither is less than none nor more than both together,
-/// however little the data distinguish one from the other.
+/// Returns a dead time and a lag, each with its standard deviation: neither is less than zero or more than both
+/// together, however little the data distinguish one from the other.
 pub fn late_reported(context: &ReportContext, parameters: &[Parameter]) -> ReportedValues {
     let most_s = context.parameters.iter().sum::<f64>() + HALF_95 * context.deviation_of_sum();
     let mut reported = ReportedValues::default();

@@ -1,4 +1,4 @@
-//! Extra resistance at certain places, in all runs or some, on the part of the train there.
+//! Extra resistance at certain places, in all runs or some, on the part of the train that is there.
 
 use std::sync::Arc;
 
@@ -20,7 +20,7 @@ struct Local {
     only: Option<Arc<Passage>>,
 }
 
-/// When a run is where.
+/// Time and chainage of a run's samples.
 #[derive(Debug)]
 struct Passage {
     file: String,
@@ -56,7 +56,7 @@ pub const POLICY: Policy = Policy {
     ..Policy::USUAL
 };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     if scan.problem.positions.distance_ratio.is_none() {
         return Err("positions are not measured".into());

@@ -1,5 +1,5 @@
-//! A brake force that the rail does not carry: achieved = min(reported, mu * weight), or a share
-//! of the reported one, at certain places and in certain runs.
+//! A brake force that the rail does not transmit: achieved = min(reported, mu * weight), or a share of the reported
+//! one, at certain places and in certain runs.
 
 use std::sync::Arc;
 
@@ -14,9 +14,9 @@ use crate::explain::scan::{Scan, Tuple};
 use crate::parallel;
 use crate::statistics::greatest_first;
 
-/// Caps that a search starts from, as share of the strongest braking seen.
+/// Caps from which a search starts, as shares of the strongest braking in the runs.
 const CAP_SHARES: [f64; 4] = [0.3, 0.5, 0.65, 0.8];
-/// Braking for less than this in s says nothing.
+/// Least time in s of braking that shows adhesion.
 const BRAKING_MIN_S: f64 = 20.0;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,7 +48,7 @@ pub const POLICY: Policy = Policy {
     ..Policy::USUAL
 };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     let braking_s = scan.seconds_where(|_, sample| braking(sample) > 0.01);
     if braking_s < BRAKING_MIN_S {

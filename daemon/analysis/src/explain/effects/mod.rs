@@ -1,11 +1,11 @@
 //! The library of effects, declared beforehand: one file for each kind.
 //!
-//! A kind ([`Effect`]) proposes [`Hypothesis`] structures for the data at hand: which tunnels,
-//! which interval, which windows. A hypothesis changes the forces on the train for given
-//! parameters by the law of its term ([`dynocar_model::terms`]), and nothing else is needed: the same code
-//! fits it, simulates it and predicts with it, and the daemon applies the same law to what is
-//! written of it into the files. How the search treats a kind is its [`Policy`]. A new kind is one file, one line in
-//! [`LIBRARY`] and a row among the kinds of `dynocar_shared::vocabulary`.
+//! A kind ([`Effect`]) proposes [`Hypothesis`] structures for the data at hand: certain tunnels, an interval, some
+//! windows. A hypothesis changes the forces on the train, for given parameters, by the law of its term
+//! ([`dynocar_model::terms`]), and nothing else is needed: the same code fits it, simulates it and predicts with it,
+//! and the daemon applies the same law to the entries of the effect in the files. The [`Policy`] of a kind states how
+//! the search treats it. A new kind is one file, one line in [`LIBRARY`] and a row among the kinds of
+//! `dynocar_shared::vocabulary`.
 
 mod actuator_delay;
 mod ambient_temperature;
@@ -43,8 +43,8 @@ pub use proposal::{Candidate, Effect, Proposal, Whole};
 pub use usual_errors::{map_error_as_fitted, usual_errors};
 pub use vertical_curves::{USUAL_LENGTH_M, vertical_curves};
 
-/// Every kind, in the order of the search: timing, scales, mass and gain, what is tied to a
-/// place, environment, actuators. What is in no library comes last.
+/// Every kind, in the order of the search: timing, scales, mass and gain, effects tied to a place, environment,
+/// actuators. Forces outside the library come last.
 pub const LIBRARY: &[Effect] = &[
     Effect::new(ActuatorDelay, actuator_delay::of_both, Whole::None).with(&actuator_delay::POLICY),
     Effect::new(BrakeDelay, actuator_delay::of_brake, Whole::None).with(&actuator_delay::OF_BRAKE),
@@ -78,12 +78,12 @@ pub const UNKNOWN: &Effect =
     &Effect::new(Unknown, unknown::propose_forms, Whole::None).with(&unknown::POLICY);
 pub use unknown::{a_form_explains_more, leaves_a_force};
 
-/// Returns the policy in a kind's row of the library; the usual one for what has no row.
+/// Returns the policy in a kind's row of the library; the usual one for a kind without a row.
 pub fn policy_of(kind: EffectKind) -> &'static Policy {
     effect_of(kind).map_or(&Policy::USUAL, |it| &it.policy)
 }
 
-/// Returns a kind's row of the library; `None` for what has none.
+/// Returns a kind's row of the library; `None` for a kind without one.
 pub fn effect_of(kind: EffectKind) -> Option<&'static Effect> {
     LIBRARY.iter().find(|effect| effect.kind == kind)
 }

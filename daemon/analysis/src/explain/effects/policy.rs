@@ -1,14 +1,14 @@
-//! How the search treats a kind of effect: what makes it certain, where it is sought, and which usual errors it
+//! How the search treats a kind of effect: when the kind is certain, where it is sought, and which usual errors it
 //! replaces. The policy of a kind stands in its own file and in its row of the library.
 
 use dynocar_shared::vocabulary::EffectKind;
 
-/// Where strong evidence alone accepts a kind, however little the kind takes from the error.
+/// Where strong evidence alone accepts a kind, however little of the error the kind removes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Certainty {
     /// With the usual errors in the model, and without them.
     Anywhere,
-    /// Only with the usual errors in the model, which otherwise look like it.
+    /// Only with the usual errors in the model, which otherwise look like the kind.
     BesideUsualErrors,
     /// Nowhere: only the acceptance score accepts it.
     Never,
@@ -17,18 +17,18 @@ pub enum Certainty {
 /// A declared figure that is usually a little wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DeclaredFigure {
-    /// By a share of the traction force.
+    /// A share of the traction force.
     Traction,
-    /// By a share of the brake force.
+    /// A share of the brake force.
     Brake,
-    /// Seconds between a report and its force.
+    /// The time in s between a report and its force.
     Lateness,
-    /// By a share of the curve resistance.
+    /// A share of the curve resistance.
     Curves,
-    /// By a share of a when bearings are cold.
+    /// A share of a when bearings are cold.
     Warming,
-    /// By so much of the rotating-mass factor: seldom weighed, the same in every run, and for the motion a scale
-    /// of all that acts, gradients among it, as a wheel's is.
+    /// A part of the rotating-mass factor. It is seldom weighed and the same in every run, and it scales the
+    /// acceleration by all forces and gradients, as a wrong wheel does.
     RotatingMass,
     /// By a share of the gradient that an accelerometer feels.
     FeltGradient,
@@ -57,7 +57,7 @@ pub struct Policy {
     /// Whether a wrong gradient or wheel leaves such a force where pieces of the line end, so that a place that was
     /// chosen is not certain beside these.
     pub is_left_by_moved_places: bool,
-    /// Whether it is sought with the usual errors in the model: it acts on the train by one law wherever that is.
+    /// Whether it is sought with the usual errors in the model: it acts on the train by one law at every place.
     pub is_sought_beside_usual_errors: bool,
     /// The kind as a small error that every railway has; `None` if it is no such error.
     pub everyday: Option<Everyday>,

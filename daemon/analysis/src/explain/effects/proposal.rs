@@ -29,12 +29,13 @@ impl Candidate {
         !of.ends().is_empty() || of.is_event() || of.is_gradient()
     }
 
-    /// Whether its structure is the only one, whatever is left to explain.
+    /// Returns whether its structure is the only one, independent of the remaining residual.
     pub fn is_fixed(&self) -> bool {
         !self.is_chosen_among_many() && self.hypothesis.nature().choice_cost == 0.0
     }
 
-    /// The structure, and no effect where a fit comes to its values in one step: it is linear in them.
+    /// Returns the structure and a start for the fit: no effect where the model is linear in the values, which a fit
+    /// then finds in one step; otherwise the values.
     pub fn from_none(self) -> (SharedHypothesis, Vec<f64>) {
         let effect = &self.hypothesis;
         let is_linear = match effect.nature().handling {
@@ -86,7 +87,7 @@ impl Effect {
         Effect { policy: *policy, ..self }
     }
 
-    /// Structures for the data at hand, given what the current model leaves.
+    /// Proposes structures for the data at hand, given the residual of the current model.
     pub fn propose(&self, scan: &Scan) -> Proposal {
         (self.propose)(scan)
     }

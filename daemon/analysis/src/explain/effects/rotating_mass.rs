@@ -1,5 +1,5 @@
-//! Another rotating mass than declared: inertial mass = mass (1 + gamma). Unlike the mass it does
-//! not feel the gradient.
+//! Another rotating mass than declared: inertial mass = mass (1 + gamma). Unlike the mass, it does not change the force
+//! of a gradient.
 
 use dynocar_model::terms::rotating;
 use dynocar_shared::vocabulary::EffectKind;
@@ -18,7 +18,7 @@ struct Gamma {
 /// It estimates a figure that is usually a little wrong.
 pub const POLICY: Policy = Policy { frees: &[DeclaredFigure::RotatingMass], ..Policy::USUAL };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     let declared = scan.train.rotating_mass_factor;
     let is_like_traction = scan.are_inertia_and_traction_alike();

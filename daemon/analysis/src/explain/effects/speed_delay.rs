@@ -1,5 +1,5 @@
-//! A measured speed that is late. Forces that act late leave the gradient on time, a late speed does
-//! not: what the line does distinguishes the two, and so does a position that runs ahead of the speed.
+//! A measured speed that is late. The gradient acts in time where only the forces are late, but seems late where the
+//! speed is: this distinguishes the two, and so does a position that is ahead of the speed.
 
 use dynocar_model::terms::extra::Covariate;
 use dynocar_model::terms::speed_delay;
@@ -14,7 +14,7 @@ use super::{
 use crate::explain::evidence::SampleForces;
 use crate::explain::scan::Scan;
 
-/// Delay and lag in s that a fit may start from.
+/// Delays and lags in s from which a fit may start.
 const STARTS: [[f64; 2]; 4] = [[0.6, 0.1], [0.1, 0.6], [1.2, 0.3], [0.3, 1.2]];
 
 #[derive(Debug)]
@@ -29,7 +29,7 @@ pub const POLICY: Policy = Policy {
     ..Policy::USUAL
 };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     if !scan.problem.runs.iter().any(|run| run.is_position_recorded) {
         return Err(

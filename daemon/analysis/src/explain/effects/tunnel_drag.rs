@@ -1,8 +1,8 @@
 //! Air resistance in tunnels: c v² is larger for the part of the train inside.
 //!
-//! A map without a tunnel does not prove that there is no tunnel: beside the mapped tunnels, places are looked for
-//! where c v² is larger. Trains that pass a place at different speeds distinguish that from a constant resistance
-//! there.
+//! A map without a tunnel does not prove that there is no tunnel: besides the mapped tunnels, the search looks for
+//! places where c v² is larger. Trains that pass a place at different speeds distinguish a tunnel from a constant
+//! resistance there.
 
 use std::sync::Arc;
 
@@ -20,9 +20,9 @@ use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::places::{Inside, Site, find};
 use crate::explain::scan::Scan;
 
-/// Motion in s inside mapped tunnels that says something of them.
+/// Least time in s of motion inside mapped tunnels.
 const MAPPED_MIN_S: f64 = 10.0;
-/// A tunnel that nobody mapped is less likely than some resistance at a place.
+/// Additional price of an unmapped tunnel, which is less likely than some other resistance at a place.
 const UNMAPPED_COST: f64 = 4.0;
 
 #[derive(Clone, Debug)]
@@ -37,7 +37,7 @@ struct Tunnels {
 /// wheel or gradient looks like it.
 pub const POLICY: Policy = Policy { is_left_by_moved_places: true, ..Policy::USUAL };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     let length_m = scan.train.length_m;
     let Some(track) = scan.track else {

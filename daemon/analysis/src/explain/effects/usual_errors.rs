@@ -1,6 +1,6 @@
-//! Usual errors of declared figures: scales of the reported forces, how late they act, the curve constant; and the
-//! map's own small error where its shape is known. They are no effects: other effects are sought, and a finished
-//! model is fitted, with them included.
+//! Usual errors of declared figures: scales of the reported forces, their lateness, the curve constant and others; and
+//! the map's own small error where its shape is known. They are no effects: the search for other effects and the fit of
+//! a finished model include them.
 
 use dynocar_model::terms::extra::Covariate;
 use dynocar_model::terms::{Parameter, bearings, curve, delay, gradient, rotating, traction};
@@ -36,11 +36,11 @@ struct UsualErrors {
     information: DMatrix<f64>,
 }
 
-/// Nuisance parameters for the errors of the figures that no effect of the model estimates, initialised to zero.
+/// Returns nuisance parameters for the errors of the figures that no effect of the model estimates, starting at zero.
 pub fn usual_errors(a_n_per_kn: f64, is_free: impl Fn(DeclaredFigure) -> bool) -> Candidate {
     let free: Vec<(DeclaredFigure, f64)> = FIGURES.into_iter().filter(|it| is_free(it.0)).collect();
     let parameter = |&(figure, std): &(DeclaredFigure, f64)| {
-        // Nothing acts before it is reported, and what warms up resists less.
+        // No force acts before its report, and bearings that warm up resist less.
         let least = if matches!(figure, DeclaredFigure::Lateness | DeclaredFigure::Warming) {
             0.0
         } else {

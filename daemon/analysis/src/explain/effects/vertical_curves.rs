@@ -1,7 +1,7 @@
-//! Vertical curves: a line rounds the steps of its gradient, and a map states the steps. The same in every
-//! run and at every step, so that no number of runs shows it as scatter: a train feels less of each step than the
-//! map says, as if its inertia were greater. How long the curves are is not known; no effect, but what a finished
-//! model is fitted beside.
+//! Vertical curves: a line rounds the steps of its gradient, where a map states the steps. They are the same in every
+//! run and at every step, so that no scatter between the runs shows them. A train feels less of each step than the map
+//! states, as if its inertia were greater. The length of the curves is not known. They are no effect, but an error that
+//! is in the finished model.
 
 use std::sync::Arc;
 
@@ -14,13 +14,15 @@ use nalgebra::DMatrix;
 use super::{Candidate, Handling, Hypothesis, Nature, On};
 use crate::explain::evidence::{RunData, SampleForces};
 
-/// Usual length in m over which a step is rounded; what a train feels grows with the square of the length.
+/// Usual length in m over which a step is rounded; the change of the force on a train grows with the square of the
+/// length.
 pub const USUAL_LENGTH_M: f64 = 60.0;
-/// Standard deviation of the share of that, its greatest, and the step of differences: lengths up to 190 m.
+/// Standard deviation of the factor on the usual rounding, its greatest value, and the step of differences: lengths up
+/// to 190 m.
 const USUAL_STD: f64 = 1.0;
 const SHARE_MAX: f64 = 10.0;
 const STEP: f64 = 0.1;
-/// Greatest distance in m of the places at which the mean over the length is taken.
+/// Greatest distance in m between the places over which the gradient is averaged.
 const APART_M: f64 = 15.0;
 
 #[derive(Debug)]
@@ -33,7 +35,8 @@ struct Rounded {
     information: DMatrix<f64>,
 }
 
-/// Returns a share of what steps that are rounded over a length in m change, from a share to start from.
+/// Returns the change of the gradient by steps that are rounded over a length in m, times a share as the parameter,
+/// with its start.
 pub fn vertical_curves(
     track: Arc<Track>,
     train_length_m: f64,

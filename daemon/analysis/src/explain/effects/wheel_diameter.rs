@@ -1,5 +1,5 @@
-//! Wheels of another diameter than declared: measured speed = scale * true speed, and the odometer
-//! with it. Balises distinguish it from the rotating mass: they correct the position.
+//! Wheels of another diameter than declared: measured speed = scale * true speed, and the odometer has the same scale.
+//! Balises, which correct the position, distinguish this effect from the rotating mass.
 
 use dynocar_model::terms::wheel;
 use dynocar_shared::vocabulary::EffectKind;
@@ -18,7 +18,7 @@ pub const POLICY: Policy = Policy {
     ..Policy::USUAL
 };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     if scan.problem.positions.distance_ratio.is_none() {
         return Err("no measured positions to compare the speed with".into());

@@ -1,4 +1,4 @@
-//! Wind along the line. One wind for all runs, or one for each run.
+//! Wind along the line: one wind for all runs, or one for each run.
 
 use std::collections::BTreeMap;
 
@@ -13,8 +13,8 @@ use crate::explain::answer::ParameterValue;
 use crate::explain::evidence::{CERTAIN_STDS, RunData, SampleForces};
 use crate::explain::scan::Scan;
 
-/// A headwind that both directions share is at most this many times the part that they do not share, or may come by
-/// the scatter of the winds.
+/// Greatest headwind that both directions share, as a multiple of the part that they do not share; it may also come
+/// from the scatter of the winds.
 const AHEAD_MAX: f64 = 3.0;
 
 #[derive(Debug)]
@@ -27,7 +27,7 @@ struct ByRun {
     parameters: Vec<Parameter>,
 }
 
-/// Winds differ from run to run, so it is never certain; on ordinary days they are part of the model without a name.
+/// Winds differ from run to run, so a wind is never certain; on ordinary days it is part of the model without a name.
 pub const POLICY: Policy = Policy {
     certainty: Certainty::Never,
     is_sought_beside_usual_errors: false,
@@ -35,7 +35,7 @@ pub const POLICY: Policy = Policy {
     ..Policy::USUAL
 };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     let runs = &scan.problem.runs;
     if runs.iter().all(|run| run.direction == runs[0].direction) {

@@ -1,9 +1,9 @@
-//! Inner products of accelerations behind the whitening filter, without whitening them.
+//! Inner products of whitened accelerations, without whitening them.
 //!
-//! The filter is linear: what 1 m/s² at a bin adds to the product with whitened series is a number of the bin, and all
-//! of them come from one pass of the adjoint filter backwards over the run. A square depends, behind the last bin where
-//! something acts, on the state in which the filter is left there only. So a force at a place costs as many steps
-//! as it has bins, however long the filter remembers it.
+//! The whitening filter is linear: the product of whitened accelerations with a whitened series is a sum over the bins,
+//! with one factor for each bin. One backward pass of the adjoint filter over the run gives all these factors. The
+//! part of a square after the last bin where a force acts depends only on the state of the filter there. A force at a
+//! place therefore costs as many steps as it has bins, however long the filter remembers it.
 
 use std::array;
 
@@ -12,11 +12,11 @@ use super::run_data::RunData;
 use super::run_scatter::DEVIATIONS;
 use super::whitener::{self, FADING, LEVEL};
 
-/// How accelerations at the bins of one run look to a fit.
+/// Adjoint filter of one run: it gives products of accelerations at the bins with the series of a fit.
 #[derive(Clone, Debug)]
 pub struct Adjoint {
-    /// By bin what 1 m/s² there adds to the weighted products with the innovations, the columns of the run's own factors
-    /// and the regressors that touch the run.
+    /// Change by 1 m/s² at each bin of the weighted products with the innovations, the columns of the run's own
+    /// factors and the regressors that touch the run.
     added: Vec<f64>,
     /// The numbers of these regressors.
     regressors: Vec<usize>,
@@ -26,10 +26,10 @@ pub struct Adjoint {
 
 /// Number of columns summed side by side.
 const WIDE: usize = 4;
-/// Products before those with the regressors.
+/// Number of products before those with the regressors.
 const OWN_PRODUCTS: usize = 1 + DEVIATIONS;
 
-/// Weighted products of the innovations that accelerations make.
+/// Weighted products of whitened accelerations.
 pub struct Products {
     /// With the innovations.
     pub innovations: f64,
@@ -39,14 +39,14 @@ pub struct Products {
     pub factors: [f64; DEVIATIONS],
 }
 
-/// A step of the filter in terms of how far the speed is ahead of the level: no constant speed changes that.
+/// A step of the filter, for the difference between speed and level, which no constant speed changes.
 #[derive(Clone, Copy, Debug)]
 struct Step {
     /// Half of the time in s from the bin before; 0 where a segment starts, as all but `fade`.
     half_s: f64,
     fade: f64,
     carry_s: f64,
-    /// Share of a difference that is left to the next bin.
+    /// Share of a difference that remains at the next bin.
     left: f64,
     /// Gain of the fading acceleration from a difference.
     gain: f64,
@@ -58,22 +58,22 @@ struct Step {
     behind: [f64; 3],
 }
 
-/// Difference and fading acceleration after a step from the bin before: all that a square needs, in the order in
-/// which the next step waits for it.
+/// A step from one bin to the next: the difference and the fading acceleration after it. The fields are all numbers
+/// that a square needs, in the order in which the next step needs them.
 #[derive(Clone, Copy, Debug)]
 struct Walked {
     /// Half of the time in s from the bin before; 0 where a segment starts.
     half_s: f64,
     /// Weight of a squared difference.
     weight: f64,
-    /// Of the difference and the fading acceleration before, what is in the difference.
+    /// Factors of the difference and the fading acceleration before the step, for the difference.
     to_difference: [f64; 2],
-    /// The same in the fading acceleration.
+    /// The same for the fading acceleration.
     to_fading: [f64; 2],
 }
 
 impl Walked {
-    /// All steps, each behind the one before.
+    /// Returns all steps, each after the one before.
     fn all(steps: &[Step]) -> Vec<Self> {
         let mut before = [0.0; 3];
         let walked = |step: &Step| {
@@ -109,8 +109,8 @@ impl Adjoint {
         Adjoint { added, regressors, walk: Walked::all(&steps), steps }
     }
 
-    /// Products of what the filter makes of accelerations in m/s² at the bins from one on; those with the regressors
-    /// into `cross`, by their numbers.
+    /// Returns the products of whitened accelerations, given in m/s² from one bin on; those with the regressors are
+    /// added to `cross`, by their numbers.
     pub fn products(&self, from: usize, shape: &[f64], cross: &mut [f64]) -> Products {
         let width = OWN_PRODUCTS + self.regressors.len();
         let mut sums = vec![0.0; width];
@@ -133,7 +133,7 @@ impl Adjoint {
         }
     }
 
-    /// Weighted square of what the filter makes of accelerations in m/s² at the bins from one on.
+    /// Returns the weighted square of whitened accelerations, given in m/s² from one bin on.
     fn square(&self, from: usize, shape: &[f64]) -> f64 {
         let (mut sum, mut before_mps2, [mut difference, mut fading]) = (0.0, 0.0, [0.0; 2]);
         let mut act = |step: &Walked, mps2: f64| {
@@ -160,7 +160,7 @@ impl Adjoint {
     }
 }
 
-/// Of some columns of rows what they sum to with a factor on each row.
+/// Returns the sums of some columns over the rows, each row times its factor.
 fn columns_sum<'a, const N: usize>(
     rows: impl Iterator<Item = (&'a [f64], &'a f64)>,
     first: usize,
@@ -203,7 +203,8 @@ fn steps(
 }
 
 impl Step {
-    /// The square from this bin on, by what is left before it, from that behind it.
+    /// Returns the form of the square from this bin on in the state before it, by the form in the state after it: the
+    /// backward recursion of the squares.
     fn square_before(&self, [by_left, by_both, by_fading]: [f64; 3]) -> [f64; 3] {
         let Step { fade, carry_s, left, gain, weight, .. } = *self;
         let difference =
@@ -217,7 +218,7 @@ impl Step {
     }
 }
 
-/// The adjoint of the filter: what 1 m/s² at each bin adds to the weighted product with a whitened series.
+/// Runs the adjoint filter backwards: the change by 1 m/s² at each bin of the weighted product with a whitened series.
 fn back<'a>(
     steps: &[Step],
     weights: &[f64],

@@ -1,4 +1,4 @@
-//! Means over a few samples of motion: what is compared with a model.
+//! Means over a few samples of motion, which are compared with a model.
 
 use dynocar_model::simulate::OpenLoopRecording;
 
@@ -6,15 +6,15 @@ use crate::statistics::{middle, span};
 
 /// Width in s of a bin over which speeds are averaged.
 const BIN_S: f64 = 2.0;
-/// A bin is at least this many sampling periods wide.
+/// Least width of a bin in sampling periods.
 const BIN_SAMPLES_MIN: f64 = 2.0;
-/// Below this speed in m/s the train's motion is not used: holding brakes and stiction act.
+/// Speed in m/s below which the motion is not used: holding brakes and stiction act.
 pub(super) const MOVING_MPS: f64 = 0.8;
-/// A longer step in s between samples ends a segment of motion.
+/// Longest step in s between samples within a segment of motion.
 pub(super) const SEGMENT_GAP_MAX_S: f64 = 5.0;
-/// Segments of fewer bins say nothing.
+/// Least number of bins of a segment that is used.
 const SEGMENT_BINS_MIN: usize = 4;
-/// Time in s for which the couplings of a train ring after a change of force.
+/// Time in s for which the couplings of a train oscillate after a change of force.
 const RINGING_S: f64 = 6.0;
 
 /// Mean over a few samples of one segment of motion, with the features of its middle.

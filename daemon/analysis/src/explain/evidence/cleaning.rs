@@ -1,21 +1,21 @@
-//! Replaces what sticks out from its neighbours before anything is fitted.
+//! Replacement of outliers by their neighbours' median before anything is fitted.
 
 use dynocar_model::force::ResolvedSample;
 
 use crate::statistics::middle;
 
-/// Samples to each side that a value is compared with.
+/// Number of samples on each side with which a value is compared.
 const HALF_WINDOW: usize = 3;
-/// Multiple of the usual deviation from the surrounding median that makes an outlier.
+/// Least deviation of an outlier from the surrounding median, in usual deviations.
 const OUTLIER_SPREADS: f64 = 8.0;
 
-/// Samples further apart than this many s do not show what is an outlier.
+/// Sampling period in s above which the neighbours do not show whether a value is an outlier.
 const SPARSE_S: f64 = 0.5;
-/// The sharpest bend of a speed curve in m/s².
+/// Sharpest bend of a speed curve in m/s².
 const SPEED_BEND_MPS2: f64 = 1.5;
 
-/// Replaces outliers by the median around them; returns how many. `least` is the difference
-/// below which nothing is an outlier.
+/// Replaces outliers by the median around them; returns their number. `least` is the difference below which no value is
+/// an outlier.
 pub(super) fn replace_outliers(values: &mut [f64], least: f64) -> usize {
     if values.len() <= 2 * HALF_WINDOW {
         return 0;

@@ -1,30 +1,31 @@
-//! Criteria that decide whether something is more than chance, and whether two explanations are one.
+//! Criteria that decide whether an effect is more than chance, and whether two explanations are equally good.
 
-/// Strength that an effect must have. Simulated data without any effect stay far below it
-/// ([`NULL_SCORE`]); recorded data, whose noise is not quite what the model of it says, come nearer.
+/// Acceptance score that an effect must exceed. Simulated data without any effect stay far below it ([`NULL_SCORE`]);
+/// recorded data, whose noise differs from its model, come nearer.
 pub const SCORE_MIN: f64 = 3.0;
-/// Standard deviations by the scatter between the runs that a number on which they agree is away from none.
+/// Least distance from no effect of a number on which the runs agree, in standard deviations by the scatter between
+/// them.
 pub const CERTAIN_STDS: f64 = 4.0;
-/// The same of what is one number a run, for which no place, run or form was chosen.
+/// The same for an effect that depends on one number per run, for which no place, run or form was chosen.
 pub const CERTAIN_STDS_BY_RUN: f64 = 3.0;
-/// Evidence by which two explanations may differ and still explain the data equally well; what is added
-/// beside others explains this much more than its price.
+/// Evidence by which two explanations may differ and still explain the data equally well; an additional effect must
+/// explain this much more than its price.
 pub const EQUAL: f64 = 6.0;
-/// The library comes first: what is outside must explain more than a known kind.
+/// Evidence by which a force outside the library must explain more than a known kind.
 pub const OUTSIDE_COST: f64 = 10.0;
-/// Strength of the strongest candidate of a search where nothing acts, fitted to the quantiles that
-/// `dynocar-bench explain --kind none --kind none_poor_recording --seeds 200 --first-seed 2001` prints: 0.10,
-/// 0.20, 0.44 and 0.88 for shares of 0.05, 0.02, 0.01 and 0.0025.
+/// Acceptance score of the strongest candidate of a search where nothing acts, fitted to the quantiles that
+/// `dynocar-bench explain --kind none --kind none_poor_recording --seeds 200 --first-seed 2001` prints: 0.10, 0.20,
+/// 0.44 and 0.88 for shares of 0.05, 0.02, 0.01 and 0.0025.
 pub const NULL_SCORE: NullScore = NullScore { share: 0.05, at: 0.10, power: 1.0 };
 
-/// The tail of a distribution of strengths.
+/// The tail of a distribution of acceptance scores.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NullScore {
     /// Share of the searches that reach `at`.
     pub share: f64,
-    /// A strength.
+    /// An acceptance score.
     pub at: f64,
-    /// The share falls with this power of the strength.
+    /// Power of the score with which the share falls.
     pub power: f64,
 }
 

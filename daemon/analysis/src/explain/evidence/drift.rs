@@ -1,8 +1,8 @@
-//! The drift of an odometer between the balises that correct it, taken out of the positions.
+//! Correction of the positions for an odometer's drift between the balises that correct it.
 //!
-//! An odometer shares the error of the wheels, so that a position just before a balise lies as far from the
-//! true one as the train has driven since the last balise times that error: gradients, curves and tunnels are
-//! looked up there, in every run at the same places.
+//! An odometer shares the error of the wheels: just before a balise, its position is wrong by this error times the
+//! distance since the last balise. Gradients, curves and tunnels are then looked up at the wrong chainage, in every run
+//! at the same places.
 
 use dynocar_model::simulate::OpenLoopRecording;
 
@@ -10,15 +10,15 @@ use super::positions::{
     CORRECTION_MIN_M, DISTANCE_MIN_M, Distances, END_ERROR_M, between_corrections, distances,
 };
 
-/// Corrections closer together than this in m on average are the noise of positions that are no odometer's.
+/// Least mean distance in m between corrections: closer ones are the noise of positions that come from no odometer.
 const APART_MIN_M: f64 = 100.0;
-/// An odometer that errs by more than this share is none.
+/// Greatest error of an odometer, as a share of the distance.
 const RATE_MAX: f64 = 0.1;
-/// Number of standard deviations of all corrections together that is more than chance.
+/// Least sum of all corrections that is more than chance, in standard deviations.
 const CHANCE_STDS: f64 = 2.0;
 
-/// By how many m along the chainage each position of a recording is moved to take the drift out; `None` where
-/// too few corrections show it.
+/// Returns by how many m along the chainage each position of a recording is moved to remove the drift; `None` where too
+/// few corrections show it.
 pub(super) fn drift_m(recording: &OpenLoopRecording) -> Option<Vec<f64>> {
     let steps = distances(recording);
     let between = between_corrections(&steps);
@@ -40,7 +40,7 @@ pub(super) fn drift_m(recording: &OpenLoopRecording) -> Option<Vec<f64>> {
             let end = rest.iter().position(Distances::is_corrected);
             let (stretch, behind) = rest.split_at(end.unwrap_or(rest.len()));
             let length_m: f64 = stretch.iter().map(|step| step.by_position_m).sum();
-            // A correction that is far from what the others say is an error of its own.
+            // A correction far from the usual one is an error of its own.
             let usual_m = rate * length_m;
             let fixed_m = behind.first().map(Distances::missed_m);
             let whole_m =
@@ -56,8 +56,8 @@ pub(super) fn drift_m(recording: &OpenLoopRecording) -> Option<Vec<f64>> {
     Some(moved_m)
 }
 
-/// Returns the standard deviation in m of the sum of all corrections, by how they scatter about those of a rate and
-/// by what is too small to be seen; a correction that is far from what the others say counts as one at its limit.
+/// Returns the standard deviation in m of the sum of all corrections, from their scatter about those of a constant rate
+/// and from the least correction that can be seen; a correction far from the usual one counts as one at its limit.
 fn chance_m(between: &[Distances], rate: f64) -> f64 {
     let (mut fixes, mut square_m2, mut counted_m) = (0.0_f64, 0.0, 0.0);
     for step in between {

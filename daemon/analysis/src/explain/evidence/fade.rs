@@ -1,10 +1,10 @@
-//! Remainder of a quantity that fades, step by step.
+//! Share of a fading quantity that remains, step by step.
 
-/// Steps in s that differ by no more are equal: what is left of rounded times.
+/// Greatest difference in s of steps that count as equal: recorded times are rounded.
 pub(super) const SAME_STEP_S: f64 = 1e-9;
 
-/// The share exp(-step / time) that is left after each step; computed anew only where the step
-/// changes, for nearly all steps of a recording are equal.
+/// Share exp(-step / time) that remains after each step; it is computed again only where the step changes, since nearly
+/// all steps of a recording are equal.
 #[derive(Clone, Copy, Debug)]
 pub struct Fade {
     time_s: f64,
@@ -13,12 +13,12 @@ pub struct Fade {
 }
 
 impl Fade {
-    /// Fading with a time constant in s.
+    /// Returns a fade with a time constant in s.
     pub fn new(time_s: f64) -> Self {
         Fade { time_s, step_s: 0.0, share: 1.0 }
     }
 
-    /// The share that is left after a step in s.
+    /// Returns the share that remains after a step in s.
     #[inline]
     pub fn over(&mut self, step_s: f64) -> f64 {
         if (step_s - self.step_s).abs() > SAME_STEP_S {

@@ -1,9 +1,9 @@
-//! Speeds that accelerations come to at the bins of a run; what a model makes of these for every a, b and c at once.
+//! Speeds at the bins of a run by integrated accelerations, and a model's speeds there for any a, b and c.
 
 use super::bins::Bin;
 use super::run_data::RunData;
 
-/// Integrals on their way over the bins of a run, each segment of motion starting from zero.
+/// Integrals in progress over the bins of a run; each segment of motion starts from zero.
 pub(super) struct Integral<const N: usize> {
     segment: usize,
     gained: [f64; N],
@@ -15,7 +15,7 @@ impl<const N: usize> Integral<N> {
     pub(super) const START: Self =
         Integral { segment: usize::MAX, gained: [0.0; N], last_s: 0.0, last: [0.0; N] };
 
-    /// Their means over the next bin.
+    /// Returns the means of the integrals over the next bin.
     #[inline]
     pub(super) fn mean(
         &mut self,
@@ -60,8 +60,8 @@ pub fn integrate_bins<const N: usize>(
     }
 }
 
-/// Modelled speeds in m/s at the bins of a run, each segment starting from zero: linear in a, b and c, so
-/// that these need no look at the samples again.
+/// Modelled speeds in m/s at the bins of a run, each segment starting from zero. They are linear in a, b and c, so that
+/// other values of these need no new pass over the samples.
 #[derive(Clone, Debug, Default)]
 pub struct Response {
     /// Without a, b and c.
@@ -80,12 +80,12 @@ impl Response {
         bins.extend(rows.map(|(rest, ((by_a, by_b), by_c))| rest + a * by_a + b * by_b + c * by_c));
     }
 
-    /// Adds a multiple of another.
+    /// Adds a multiple of another response.
     pub fn add(&mut self, times: f64, other: &Response) {
         self.each(other, |own, other| *own += times * other);
     }
 
-    /// Becomes the change from another for each unit of what differs by so much.
+    /// Turns this response into its slope: its change from another for each unit of a parameter that differs by `by`.
     pub fn become_slope_from(&mut self, other: &Response, by: f64) {
         self.each(other, |own, other| *own = (*own - other) / by);
     }

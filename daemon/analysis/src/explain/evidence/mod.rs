@@ -1,11 +1,10 @@
 //! Evidence of the runs on a model: observations, their noise, and the joint fit.
 //!
-//! The measured speed is compared with the integral of the modelled acceleration, never
-//! differentiated. Samples are averaged in bins of about two seconds, within which outliers have
-//! been replaced before. What is left after the model is a random process: measurement noise on
-//! top of the integral of an unmodelled force. A Kalman filter of that process turns the bins'
-//! differences into white innovations, for residuals and regressors alike, so that the fit is a
-//! least-squares problem whatever the noise.
+//! The measured speed is compared with the integral of the modelled acceleration, never differentiated. Samples, whose
+//! outliers have been replaced before, are averaged in bins of about two seconds. The residual of the model is a random
+//! process: measurement noise on top of the integral of an unmodelled force. A Kalman filter of that process turns the
+//! bins' differences into white innovations, for residuals and regressors alike, so that the fit is a least-squares
+//! problem under any noise.
 
 mod adjoint;
 mod bins;

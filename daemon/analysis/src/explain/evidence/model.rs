@@ -64,12 +64,12 @@ impl UpdatedModel {
             .collect()
     }
 
-    /// Returns the greatest change that its effects make to those among them that only add something.
+    /// Returns the greatest influence of its effects on those among them that only add a resistance or a gradient.
     pub fn on_others(&self) -> OnOthers {
         self.effects.iter().map(|it| it.nature().on_others).max().unwrap_or(OnOthers::Nothing)
     }
 
-    /// The factor on what the effects do that only add something.
+    /// Returns the factor on the effects that only add a resistance or a gradient.
     pub fn scale_of_added(&self, theta: &[f64]) -> f64 {
         let effects = self.effects.iter().zip(self.ranges());
         effects.map(|(effect, range)| effect.scale_of_others(&theta[range])).product()
@@ -144,7 +144,7 @@ impl UpdatedModel {
         self.forces_on_day(run, theta, &RunFactors::zeros(), forces);
     }
 
-    /// The same with what differs from run to run: factors less 1 on the control force and on the basic
+    /// Returns the same forces with the run's own factors: factors less 1 on the control force and on the basic
     /// resistance, and a headwind in m/s.
     pub fn forces_on_day(
         &self,

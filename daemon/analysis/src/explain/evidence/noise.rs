@@ -1,13 +1,13 @@
-//! The process that is left when the model is right.
+//! Random process that remains when the model is right.
 
-/// Shares of the slow part of a noise under which a kind looks again.
+/// Shares of the slow part of a noise under which a kind is tried again.
 const STIFF_SHARES: [f64; 2] = [0.01, 1e-4];
 /// Least variance in (m/s²)² of a fading force.
 const FADING_VAR_MIN: f64 = 1e-10;
 
-/// Noise of the bins: white measurement noise, a white force, and a force that fades with a time
-/// constant (Ornstein-Uhlenbeck), as gusts or a rough map leave it. Where the control force changes,
-/// the car with the tacho moves against the others on its couplings: more measurement noise there.
+/// Noise of the bins: white measurement noise, a white force, and a force that fades with a time constant
+/// (Ornstein-Uhlenbeck), such as gusts or a rough map leave. Where the control force changes, the car with the speed
+/// sensor moves against the others on its couplings, which adds measurement noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
     /// Variance in (m/s)² of a bin's mean speed.
@@ -51,7 +51,7 @@ impl Noise {
         both
     }
 
-    /// Standard deviation in m/s² of what the force does on average over some seconds.
+    /// Returns the standard deviation in m/s² of the mean acceleration by the force over some seconds.
     pub fn mean_acceleration_mps2(&self, over_s: f64) -> f64 {
         let Noise { white_density, fading_var, fading_s, .. } = *self;
         let lasting_s = over_s - fading_s * (1.0 - (-over_s / fading_s).exp());

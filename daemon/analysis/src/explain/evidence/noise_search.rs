@@ -1,4 +1,4 @@
-//! The likeliest noise of what a model leaves.
+//! Most likely noise of a model's residuals.
 
 use super::noise::Noise;
 use super::run_data::RunData;
@@ -8,15 +8,15 @@ use crate::statistics::least_first;
 
 /// Candidates of the noise at changes of the control force, in s.
 const JUMPS_S: [f64; 6] = [0.0, 0.03, 0.1, 0.3, 1.0, 3.0];
-/// Runs that one thread takes at a time: less work is not worth handing out.
+/// Number of runs that one thread takes at a time: fewer are not worth handing out.
 pub const RUNS_A_TASK: usize = 8;
 /// Largest number of runs with which a search starts.
 const COARSE_RUNS_MAX: usize = 32;
-/// How far around a start in logarithms a search begins, and around what some of the runs show.
+/// Width of a search in logarithms of the noise: around a start, and around the result for some of the runs.
 const FAR: f64 = 1.2;
 const NEAR: f64 = 0.1;
 
-/// Returns the step with which these runs are thinned, evenly, where a search starts.
+/// Returns the step with which the runs are thinned, evenly, at the start of a search.
 pub fn coarse_step(runs: usize) -> usize {
     runs.div_ceil(COARSE_RUNS_MAX).max(1)
 }

@@ -1,5 +1,4 @@
-//! Effects that act on the forces of a run, block by block: few enough samples at a time to stay near the
-//! processor.
+//! Effects that act on the forces of a run, in blocks of so few samples that they stay in the processor's cache.
 
 use std::ops::Range;
 
@@ -8,7 +7,7 @@ use super::run_data::RunData;
 use super::sample_forces::SampleForces;
 use crate::explain::hypothesis::{On, Past, SharedHypothesis};
 
-/// Samples that are looked at together.
+/// Number of samples of a block.
 const BLOCK: usize = 128;
 
 /// All samples of a run, block by block.
@@ -20,7 +19,7 @@ pub(super) fn blocks(run: &RunData) -> impl Iterator<Item = Range<usize>> {
 /// Effects of a model with the ranges of their parameters, in the order in which they act.
 pub(super) struct Pass<'m> {
     pub order: Vec<(&'m SharedHypothesis, Range<usize>)>,
-    /// Whether one of them takes something of earlier samples: then none may be left out.
+    /// Whether one of them depends on earlier samples: then no sample may be left out.
     pub looks_back: bool,
 }
 
@@ -52,8 +51,8 @@ impl<'m> Pass<'m> {
         self.act(PassInput { run, theta, first }, 0..self.order.len(), acting, 0);
     }
 
-    /// Some of them act on what acted before, at the samples from one on. What they remember stands from number
-    /// `past` on.
+    /// Lets some of the effects act on the forces so far, at the samples from one on. Their memories start at number
+    /// `past`.
     pub fn act(
         &self,
         PassInput { run, theta, first }: PassInput<'_>,

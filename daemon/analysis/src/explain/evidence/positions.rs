@@ -1,8 +1,8 @@
-//! Information of positions on the speed: its scale, which is a wheel's diameter, and how late it is.
+//! Information of positions on the measured speed: its scale, which gives the wheel diameter, and its delay.
 //!
-//! Behind a speed that is late by some time, the distance by position is ahead of the distance by integrated
-//! speed by as much as the train drives in that time: more, the faster it is. An odometer that is late
-//! with the speed does not show it, so that only a position ahead says something.
+//! Where the measured speed is late, the distance by position is ahead of the distance by integrated speed by the
+//! distance that the train drives in the delay: more, the faster it is. An odometer that is as late as the speed does
+//! not show this, so that only a position ahead of the speed says something.
 
 use dynocar_model::simulate::{OpenLoopRecording, STANDING_MPS};
 use dynocar_model::terms::speed_delay;
@@ -12,10 +12,9 @@ use super::bins::SEGMENT_GAP_MAX_S;
 
 /// Distance by position over distance by integrated speed, and its standard deviation.
 ///
-/// Balises correct the position while the odometer shares the error of the wheel diameter, so
-/// that the ratio over many kilometres shows the diameter. Between two corrections the odometer
-/// drifts by that error, so that what lies before the first and behind the last says nothing, and
-/// would show a wheel nearer to the declared one than it is.
+/// Balises correct the position, while the odometer shares the error of the wheel diameter, so that the ratio over many
+/// kilometres shows the diameter. Between two corrections the odometer drifts by this error: the parts before the first
+/// correction and after the last one say nothing, and would show a wheel nearer to the declared one than it is.
 pub(super) fn distance_ratio(recording: &OpenLoopRecording) -> Option<(f64, f64)> {
     let steps = distances(recording);
     let total = |steps: &[Distances]| {
@@ -122,8 +121,8 @@ pub(super) fn by_part_s(recording: &OpenLoopRecording) -> Vec<f64> {
     parts
 }
 
-/// By how many s the speed is late in a part: what of the distance that it misses goes with the speed, and
-/// not with the way as a wheel's diameter does.
+/// Returns by how many s the speed is late in a part: the share of the missed distance that follows the speed, and not
+/// the distance as with a wrong wheel diameter.
 fn late_s(recording: &OpenLoopRecording, from: usize, end: usize) -> Option<f64> {
     let (samples, time_s) = (&recording.samples()[from..end], &recording.time_s()[from..end]);
     let speeds = samples.iter().map(|sample| sample.speed_mps);

@@ -1,4 +1,4 @@
-//! A run made ready for fitting: resolved, cleaned and binned.
+//! A run prepared for a fit: forces resolved, values cleaned, samples averaged in bins.
 
 use std::sync::Arc;
 
@@ -71,9 +71,9 @@ pub struct RunData {
 /// The power that a run's force comes from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunPower {
-    /// Power in W at each sample, `NaN` where missing; what is fed back is negative.
+    /// Power in W at each sample, `NaN` where missing; regenerated power is negative.
     pub power_w: Vec<f64>,
-    /// True where it holds what is fed beside the drive.
+    /// True where it includes the auxiliary power.
     pub has_auxiliaries: bool,
     /// True where the brake force comes from it too.
     pub is_brake: bool,
@@ -177,7 +177,7 @@ pub fn prepare_at(dataset: &Dataset, density: Density) -> Result<Vec<RunData>, R
         admission: Admission::new(DATASET_TRAIN, Arc::clone(&train)),
         resolver: ForceResolver::new(train, track),
     };
-    // An odometer counts by the speed as it was reported, whatever a train's file says of it.
+    // An odometer counts by the reported speed, without the corrections of a train's file.
     let reported = TrainModel { corrections: Corrections::default(), ..TrainModel::clone(train) };
     let mut readers = Readers {
         as_reported: reader(reported.into(), None),
@@ -212,7 +212,7 @@ impl Reader {
     }
 }
 
-/// Moves the positions of a run's rows by what its samples show.
+/// Moves the positions of a run's rows by a distance in m for each of its samples.
 fn move_positions(rows: &mut [TrainSample], samples: &[ResolvedSample], moved_m: &[f64]) {
     let mut moved = samples.iter().zip(moved_m).peekable();
     for row in rows {

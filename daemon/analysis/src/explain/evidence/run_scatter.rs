@@ -1,10 +1,10 @@
-//! Differences from run to run that are no effect: the reading of the force sensors, the resistance and the wind of
-//! the day, and the instant with which a force is stamped.
+//! Differences from run to run that are no effect: the scale of the force sensors, the resistance and the wind of the
+//! day, and the delay of the forces' time stamps.
 //!
-//! Each run has a factor of its own on the control force and on the basic resistance, near 1, and a
-//! headwind of its own, with standard deviations that are estimated from the runs, and a small delay.
-//! They are integrated out of every fit, so that what is common to all runs is judged by the scatter
-//! between them, and a few hundredths of a second between force and speed bend no resistance.
+//! Each run has a factor of its own on the control force and one on the basic resistance, both near 1, a headwind of
+//! its own, and a small delay. The standard deviations of factors and headwinds are estimated from the runs. All are
+//! integrated out of every fit, so that the scatter between the runs decides about effects that all runs share, and a
+//! few hundredths of a second between force and speed do not distort the resistance.
 
 use std::sync::Arc;
 
@@ -115,7 +115,7 @@ fn rows([c0, c1, c2, c3]: &DeviationColumns) -> impl Iterator<Item = [f64; DEVIA
     c0.iter().zip(c1).zip(c2).zip(c3).map(|(((c0, c1), c2), c3)| [*c0, *c1, *c2, *c3])
 }
 
-/// A series less what deviations explain by their columns.
+/// Returns a series less the share that deviations explain by their columns.
 pub fn remove(columns: &DeviationColumns, series: &[f64], deviations: &RunFactors) -> Vec<f64> {
     let [d0, d1, d2, d3] = (*deviations).into();
     let rows = series.iter().zip(rows(columns));
@@ -201,7 +201,7 @@ impl WeightedFilter {
         &self.columns
     }
 
-    /// The series less what the factors explain.
+    /// Returns a series less the share that the factors explain.
     pub fn remove(&self, series: &[f64], factors: &RunFactors) -> Vec<f64> {
         remove(&self.columns, series, factors)
     }
@@ -222,7 +222,7 @@ pub(super) struct RunFilters {
 /// Those of all runs.
 pub(super) type SharedFilters = Arc<[RunFilters]>;
 
-/// Innovations of one run and what follows from them.
+/// Innovations of one run, with the filter, the factors and the cost that follow from them.
 pub(super) struct Whitened {
     pub innovations: Vec<f64>,
     pub filter: WeightedFilter,

@@ -6,7 +6,7 @@ use dynocar_model::force::{ForceBalance, ResolvedSample, mps2_per_n_per_kn};
 use dynocar_model::terms::Resistance;
 use dynocar_model::train::Davis;
 
-/// Accelerating forces at one sample; effects change these fields.
+/// Accelerating forces at one sample, which effects change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampleForces {
     /// Declared gross mass in kg.

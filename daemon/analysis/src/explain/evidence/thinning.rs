@@ -1,8 +1,8 @@
-//! A run thinned to samples about a second apart, each the mean of those that it stands for.
+//! A run thinned to samples about a second apart, each the mean of the samples that it replaces.
 //!
-//! Speeds and forces are averaged alike, so that the mean speed is still the integral of the mean acceleration; what
-//! is not linear in the speed changes by the variance of the speed within a second. Where what is known of the
-//! samples changes (a gap, rest, a sliding wheel, a missing value), a mean ends.
+//! Speeds and forces are averaged alike, so that the mean speed is still the integral of the mean acceleration; only
+//! terms that are not linear in the speed change, by the variance of the speed within a second. A mean ends where the
+//! traits of the samples change (a gap, rest, a sliding wheel, a missing value).
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::simulate::{OpenLoopRecording, STANDING_MPS};
@@ -10,7 +10,7 @@ use dynocar_model::terms::Resistance;
 
 use super::bins::{MOVING_MPS, SEGMENT_GAP_MAX_S};
 
-/// Time in s that a mean stands for.
+/// Time in s that one mean replaces.
 pub(super) const MEAN_S: f64 = 1.0;
 
 /// The samples of a recording, thinned.

@@ -1,4 +1,4 @@
-//! Whitening of the noise, and Huber's loss of what it leaves.
+//! Whitening of the noise, and Huber's loss of the innovations.
 
 use std::array;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use super::noise::Noise;
 use super::run_data::RunData;
 use dynocar_core::filter::Gaussian;
 
-/// Places in the belief: the level of the speed difference in m/s, the fading acceleration in m/s².
+/// Indices in the belief: the level of the speed difference in m/s, the fading acceleration in m/s².
 pub(super) const LEVEL: usize = 0;
 pub(super) const FADING: usize = 1;
 
@@ -74,11 +74,11 @@ struct Walk {
     by_step: Fade,
     /// The step made last within a segment.
     last: Option<Settling>,
-    /// Whether the belief is what it led to.
+    /// Whether the belief is the result of this step.
     follows: bool,
 }
 
-/// A step from one belief to the next: from the same belief the same step leads to the same.
+/// A step from one belief to the next, remembered because the same step from the same belief has the same result.
 #[derive(Clone, Copy)]
 struct Settling {
     time_s: f64,
@@ -166,7 +166,8 @@ struct LogSum {
 
 impl LogSum {
     const NOTHING: LogSum = LogSum { sum: 0.0, product: 1.0 };
-    /// A product beyond these is closed: far from what a number holds, for variances above 1e-30.
+    /// A product outside these bounds is added as a logarithm: a variance above 1e-30 may still multiply it within the
+    /// range of `f64`.
     const CLOSED: [f64; 2] = [1e-200, 1e200];
 
     #[inline]

@@ -1,4 +1,4 @@
-//! Where along the line, and in which runs, a force of a given shape acts; how a declared gradient may be wrong there.
+//! Place along the line, and runs, where a force of a given shape acts; error of the declared gradient there.
 
 use dynocar_model::track::Track;
 
@@ -9,19 +9,20 @@ use crate::explain::scan::{Scan, Tuple};
 use crate::parallel;
 use crate::statistics::{least_first, span};
 
-/// Shortest interval in m that is looked for.
+/// Shortest interval in m that the search tries.
 const SHORTEST_M: f64 = 150.0;
 /// Final resolution of the ends in m.
 const FINEST_M: f64 = 10.0;
-/// Least number of runs in which an effect tied to a place shows, where there are that many; less is an event.
+/// Least number of runs in which an effect tied to a place shows, where there are that many; in fewer runs it is an
+/// event.
 const PLACE_RUNS_MIN: usize = 2;
-/// A further interval must add this share of what the others explain.
+/// Least share of the gain of all intervals that a further interval must add.
 const FURTHER_SHARE: f64 = 0.05;
-/// A surveyed gradient is good to this in ‰, which is N/kN.
+/// Standard deviation of a surveyed gradient in ‰, which is N/kN.
 pub const MAP_ERROR_PERMILLE: f64 = SURVEYED.permille;
-/// Times that all intervals are refined beside each other.
+/// Number of times that all intervals are refined jointly.
 const SWEEPS: usize = 2;
-/// Intervals of one effect at most.
+/// Greatest number of intervals of one effect.
 const INTERVALS_MAX: usize = 6;
 
 struct Cell {
@@ -169,8 +170,8 @@ pub fn find(scan: &Scan, shape: Shape, inside: Inside) -> Option<FoundIntervals>
     Some(found)
 }
 
-/// Standard deviation in ‰ of the mean gradient over some intervals: what the line states of each,
-/// and no less than a surveyor's.
+/// Returns the standard deviation in ‰ of the mean gradient over some intervals: the one that the line states for
+/// each, and no less than a surveyor's.
 fn gradient_std_permille(track: Option<&Track>, intervals_m: &[[f64; 2]]) -> f64 {
     let squares: f64 = intervals_m
         .iter()
@@ -230,8 +231,8 @@ impl Places<'_, '_> {
         sum
     }
 
-    /// The sum over the chosen runs of some intervals together: what one leaves behind in the noise is
-    /// still there when the train comes to the next.
+    /// Returns the sum over the chosen runs of some intervals together: the noise filter still remembers one interval
+    /// when the train comes to the next.
     fn over(&self, intervals_m: &[[f64; 2]], runs: &Option<Vec<usize>>) -> Tuple {
         let mut sum = Tuple::zero(self.scan.fit.theta.len());
         let is_chosen = |index: &usize| runs.as_ref().is_none_or(|runs| runs.contains(index));

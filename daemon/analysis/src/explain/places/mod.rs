@@ -1,10 +1,11 @@
-//! Where along the line, when, and in which runs something acts, and how surely that is known.
+//! Places along the line, times and runs where an effect acts, with their uncertainty.
 //!
-//! - [`Inside`]: how much of a train is at a place
-//! - [`find`]: the intervals and runs in which a force of some shape explains most
-//! - [`Site`], [`IntervalEnd`]: where and in which runs that is, ends that were estimated, and where else they could be
-//! - [`settle`]: every end at the middle of what the data allow, with its interval, and for every
-//!   run how likely it takes part
+//! - [`Inside`]: the share of a train that is at a place
+//! - [`find`]: the intervals and runs in which a force of a given shape explains most
+//! - [`Site`], [`IntervalEnd`]: the intervals and runs of an effect, the ends that were estimated, and where else these
+//!   could be
+//! - [`settle`]: moves every end to the median of its posterior, with its interval, and gives every run the probability
+//!   that the effect acts in it
 
 mod localise;
 mod runs;

@@ -1,18 +1,18 @@
-//! A found force, and the runs in which it acts.
+//! A force found at some places, and the runs in which it acts.
 
 use super::site::{Intervals, Site};
 use crate::explain::evidence::EQUAL;
 use crate::explain::scan::{Scan, Tuple};
 use crate::statistics::greatest_first;
 
-/// A set of intervals and runs with what a common factor on the shape there explains.
+/// A set of intervals and runs with the gain of a common factor on the shape there.
 #[derive(Clone, Debug)]
 pub struct FoundIntervals {
     /// Disjoint intervals in m, by chainage.
     pub intervals_m: Vec<[f64; 2]>,
     /// The chainage in m over which the runs move.
     pub span_m: [f64; 2],
-    /// Fit runs by number; `None` for all that pass.
+    /// Indices of the fit runs; `None` for all runs that pass.
     pub runs: Option<Vec<usize>>,
     /// Decrease of the cost.
     pub gain: f64,
@@ -25,7 +25,7 @@ pub struct FoundIntervals {
 }
 
 impl FoundIntervals {
-    /// The site of it.
+    /// Returns its site.
     pub fn site(&self, scan: &Scan) -> Site {
         let FoundIntervals { span_m, choice_cost, map_error, .. } = *self;
         let intervals_m = self.intervals_m.clone();

@@ -1,9 +1,8 @@
-//! How surely a place is known.
+//! Uncertainty of a place.
 //!
-//! An end has a posterior: the likelihood of the model with that end elsewhere, all other
-//! parameters fitted again, under a flat prior over where it could be. Where the data say nothing,
-//! as where no train braked, that is wide, and the middle of it is a better guess than the
-//! smallest place that explains the data.
+//! An end has a posterior: the likelihood of the model with that end elsewhere, all other parameters fitted again,
+//! under a flat prior over its possible values. Where the data say nothing, for example where no train braked, the
+//! posterior is wide, and its middle is a better guess than the smallest place that explains the data.
 
 use std::collections::BTreeMap;
 
@@ -13,11 +12,11 @@ use crate::explain::evidence::{Fit, FitProblem, UpdatedModel};
 use crate::explain::hypothesis::SharedHypothesis;
 use crate::statistics::least_first;
 
-/// A cost above the least by this is out of the question.
+/// Rise of the cost above the least one that rules a value out.
 const FAR: f64 = 14.0;
 /// Points on either side of an end at which its posterior is evaluated.
 const POINTS: usize = 10;
-/// Greatest rise of the cost, for every end, when ends are moved to where they are likeliest.
+/// Greatest rise of the cost, for each moved end, when the ends move to the medians of their posteriors.
 const RISE: f64 = 1.0;
 
 /// Posterior of an end.
@@ -27,8 +26,8 @@ struct Belief {
     interval: [f64; 2],
 }
 
-/// Moves the ends of all places of a fit to the medians of their posteriors, fits again, and says
-/// for each effect how surely its place is known; `None` for one whose place was not estimated.
+/// Moves the ends of all places of a fit to the medians of their posteriors, fits again, and returns the uncertainty of
+/// each effect's place; `None` for an effect whose place was not estimated.
 pub fn settle(problem: &FitProblem, fit: &mut Fit) -> Vec<Option<PlaceUncertainty>> {
     let mut model = fit.model.clone();
     let mut known = Vec::new();
@@ -184,7 +183,7 @@ fn run_probability(
     Some(probability)
 }
 
-/// Intervals of ends by what they are ends of.
+/// Intervals of ends, by chainage, window and covariate.
 #[derive(Default)]
 struct Collected {
     place: PlaceUncertainty,

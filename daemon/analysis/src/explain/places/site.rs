@@ -1,9 +1,9 @@
-//! A site: where along the line, and in which runs, something was found; its ends, estimated from the speeds.
+//! A site: the places along the line and the runs where an effect was found; its ends, estimated from the speeds.
 
 use crate::explain::answer::Location;
 use crate::explain::evidence::RunData;
 
-/// An interval is not shorter than this in m.
+/// Shortest interval in m.
 const SHORTEST_M: f64 = 100.0;
 
 /// Axis of which an end is a value.
@@ -17,7 +17,7 @@ pub enum Axis {
     Covariate,
 }
 
-/// Where else an end could be.
+/// Other values that an end could have.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Reach {
     /// Anywhere between two values.

@@ -1,4 +1,4 @@
-//! Other explanations that were considered, and why they lost.
+//! Other explanations that were tried, and why they were not accepted.
 
 use dynocar_model::words;
 use dynocar_shared::vocabulary::{EffectKind, KindRow};
@@ -18,18 +18,18 @@ pub struct CandidateRow {
     pub title: &'static str,
     /// True when it is part of the model.
     pub is_found: bool,
-    /// Evidence of it alone on top of a, b, c; `None` when it could not be tested.
+    /// Evidence of it alone in addition to a, b, c; `None` when it could not be tested.
     pub alone: Option<f64>,
-    /// Share of the open-loop error that it alone takes away, of the fit runs and of each by what the
-    /// others say of it, whichever is less.
+    /// Share of the open-loop error that it alone removes: the smaller of that over the fit runs as fitted, and that
+    /// over each run as predicted from the others.
     pub reduction: Option<f64>,
-    /// Evidence beside everything found; `None` for what was found or could not be tested.
+    /// Evidence jointly with everything found; `None` for a kind that was found or could not be tested.
     pub beside: Option<f64>,
-    /// Why it was taken or not.
+    /// Why it was accepted or not.
     pub reason: String,
 }
 
-/// Returns every kind that was considered: what was found first, then by the evidence alone.
+/// Returns every kind that was tried: those found first, then by the evidence alone.
 pub fn rows(explanation: &Explanation) -> Vec<CandidateRow> {
     let outcome = &explanation.outcome;
     let found: Vec<&str> = explanation.answer.effects.iter().map(|effect| effect.kind).collect();

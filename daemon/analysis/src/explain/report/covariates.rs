@@ -27,7 +27,7 @@ pub enum Covariate {
     TunnelShare,
     /// Traction minus brake.
     ControlForce,
-    /// Its change with time.
+    /// Change of the control force with time.
     ForceChange,
     /// Measured acceleration.
     Acceleration,

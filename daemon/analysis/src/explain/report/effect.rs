@@ -1,4 +1,5 @@
-//! Effects and verdicts in words, one text with slots for the statement, the terminal, the page, the timeline and events.
+//! Effects and verdicts in words: one text with slots for the statement, the terminal, the page, the timeline and
+//! events.
 //!
 //! An effect has a kind, a size, a location, a cost to the railway, a significance, and a recommended action.
 
@@ -22,7 +23,7 @@ type Values = BTreeMap<String, ParameterValue>;
 /// Kind, size and place of an effect.
 pub fn described(effect: &EffectAnswer) -> String {
     let kind = match effect.kind {
-        // The sentence around it says that it has no name.
+        // The sentence around this text says that the effect has no name.
         "unknown" => "a residual",
         kind => kind_name(kind),
     };
@@ -88,7 +89,7 @@ pub fn sizes(parameters: &Values, std: &Values) -> Vec<String> {
     sizes
 }
 
-/// States what the runs held out say of an effect by themselves; `None` where they hardly show it.
+/// States an effect's numbers by the holdout runs alone; `None` where these hardly show it.
 pub fn by_held_out_runs(effect: &EffectAnswer) -> Option<String> {
     let HeldOutAnswer { runs, parameters, std, p_value } = effect.held_out.as_ref()?;
     let sizes = listed(&sizes(parameters, std));
@@ -235,7 +236,7 @@ fn precision(known: &PlaceUncertainty) -> Option<String> {
     (!shown.is_empty()).then(|| format!("ends known to ± {} or better", shown.join(", ± ")))
 }
 
-/// Returns a verdict with its effects, the kinds that explain the runs as well, and what it leaves open.
+/// Returns a verdict with its effects, the kinds that explain the runs as well, and the questions that it leaves open.
 pub fn verdict_words(
     verdict: Verdict,
     effects: &[EffectAnswer],

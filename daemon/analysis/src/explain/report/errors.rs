@@ -106,7 +106,7 @@ impl Errors {
 }
 
 impl ErrorPair {
-    /// As what judges a model.
+    /// Returns the pair as the error that judges a model.
     fn judged(&self) -> Judged {
         let count = match self.resampling {
             Resampling::Runs(count) => count,

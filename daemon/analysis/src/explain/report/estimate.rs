@@ -1,4 +1,4 @@
-//! A value and how well it is known.
+//! A value and its uncertainty.
 
 use dynocar_shared::HALF_95;
 
@@ -7,19 +7,19 @@ use dynocar_shared::HALF_95;
 pub struct IntervalEstimate {
     /// The value.
     pub value: f64,
-    /// The interval; `None` where nothing gives one.
+    /// The interval; `None` where there is no standard deviation.
     pub interval: Option<[f64; 2]>,
 }
 
 impl IntervalEstimate {
-    /// Returns a value with 1.96 standard deviations to either side; none when that is no number.
+    /// Returns a value with 1.96 standard deviations to either side; without an interval when these are no number.
     pub fn normal(value: f64, deviation: f64) -> Self {
         let half = HALF_95 * deviation;
         let is_known = half.is_finite() && half > 0.0;
         IntervalEstimate { value, interval: is_known.then_some([value - half, value + half]) }
     }
 
-    /// Returns the same of what cannot be less than a least.
+    /// Returns the same for a value that cannot be less than `least`.
     pub fn at_least(self, least: f64) -> Self {
         let interval = self.interval.map(|ends| ends.map(|it| it.max(least)));
         IntervalEstimate { interval, ..self }

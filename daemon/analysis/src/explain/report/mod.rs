@@ -1,4 +1,4 @@
-//! Contents of the report of an explanation, as numbers and words: no page, no drawing.
+//! Contents of the report of an explanation, as numbers and words, without page or drawing.
 //!
 //! # Layout, in the order of the page
 //!
@@ -7,7 +7,7 @@
 //! - [`errors`]: open-loop errors before and after, with bootstrap intervals
 //! - [`windows`], [`covariates`], [`panels`]: the residual as a force, window by window, against
 //!   covariates
-//! - [`residual_line`]: the same along the line, by direction, with the places found
+//! - [`residual_line`]: the residual along the line, by direction, with the places found
 //! - [`timeline`]: the explanation as events and series in time, speeds of runs
 //! - [`parameters`]: fitted values, with uncertainty
 //! - [`candidates`]: other explanations

@@ -14,11 +14,11 @@ use crate::explain::evidence::RunData;
 use crate::explain::selection::Deviations;
 use crate::statistics::{greatest_first, least_first};
 
-/// Panels at most, beside those of single runs.
+/// Greatest number of panels, in addition to those of single runs.
 const PANELS_MAX: usize = 8;
-/// Single runs shown at most.
+/// Greatest number of single runs shown.
 const RUN_PANELS_MAX: usize = 4;
-/// Windows in a bin at least.
+/// Least number of windows in a bin.
 const WINDOWS_MIN: usize = 4;
 
 /// Windows whose covariate lies in one range.
@@ -26,7 +26,7 @@ const WINDOWS_MIN: usize = 4;
 pub struct PanelBin {
     /// Mean of the covariate, in its unit.
     pub at: f64,
-    /// Windows.
+    /// Number of windows.
     pub count: usize,
     /// Mean residual in N/kN without the effects, and 1.96 standard errors.
     pub before_n_per_kn: (f64, f64),

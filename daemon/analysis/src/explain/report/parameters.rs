@@ -1,4 +1,4 @@
-//! Fitted values with their uncertainty: parameters, and where effects act.
+//! Fitted values with their uncertainty: parameters, and the places where effects act.
 
 use dynocar_model::words::{self, stretch};
 

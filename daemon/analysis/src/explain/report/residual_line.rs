@@ -1,7 +1,7 @@
-//! The residual along the line, by direction, and where effects were found.
+//! The residual along the line, by direction, and the places where effects were found.
 //!
-//! A resistance of a place retards trains in both directions; what the map says wrong of the
-//! gradient has opposite signs in the two.
+//! A resistance at a place retards trains in both directions; an error of the map's gradient has opposite signs in the
+//! two.
 
 use dynocar_model::words;
 use dynocar_shared::HALF_95;

@@ -13,7 +13,7 @@ pub fn sentence(answer: &ExplainAnswer, errors: &Errors) -> String {
     let is_impossible = answer.impossibilities().next().is_some();
     let (verdict, means) = match &answer.effects[..] {
         [one] if answer.verdict == Verdict::Effect => (whole, meaning(&one.meaning)),
-        // A list beside the sentence describes them.
+        // The page describes several effects in a list next to the sentence.
         [_, _, ..] if answer.verdict == Verdict::Effect => (heading, String::new()),
         _ => (whole, String::new()),
     };

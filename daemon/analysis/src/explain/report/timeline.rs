@@ -1,4 +1,4 @@
-//! An explanation as events and series in time, run by run: the entries beside the data on a timeline; measured and
+//! An explanation as events and series in time, run by run, to be shown with the data on a timeline; measured and
 //! predicted speeds of some runs, thinned for drawing.
 
 use dynocar_model::simulate::Restart;
@@ -28,7 +28,7 @@ pub struct Timeline {
     pub runs: Vec<RunTimeline>,
 }
 
-/// One run in time; times are in s in the recording's own count.
+/// One run in time; times are in s in the recording's own time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunTimeline {
     /// The run's file.

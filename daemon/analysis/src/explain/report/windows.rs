@@ -1,8 +1,8 @@
 //! The residual as a force, window by window.
 //!
-//! For looking at, not for fitting: within a window of about 20 s the slope of the difference
-//! between measured and modelled speed, times the inertial mass and over the weight, is the
-//! resistance in N/kN that the model lacks there (positive retards).
+//! These forces are for the eye and not for a fit: within a window of about 20 s the slope of the difference between
+//! measured and modelled speed, times the inertial mass and over the weight, is the resistance in N/kN that the model
+//! lacks there (positive retards).
 
 use crate::explain::Explanation;
 use crate::explain::evidence::{Bin, Fit, RunData, UpdatedForces};
@@ -10,7 +10,7 @@ use crate::explain::selection::deviations;
 
 /// Bins of about 2 s in a window.
 const BINS: usize = 10;
-/// A shorter rest of a segment is dropped.
+/// Least number of bins of a window: a shorter rest of a segment is dropped.
 const BINS_MIN: usize = 5;
 
 /// One window of a fit run.

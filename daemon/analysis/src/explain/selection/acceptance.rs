@@ -1,5 +1,5 @@
-//! Whether what was tried is more than chance, large enough to matter, and seen in the runs: what accepts an effect,
-//! that it takes much from the error for its evidence or that it is certain, and why one is not accepted.
+//! Whether a trial is more than chance, large enough to matter, and seen in the runs. An effect is accepted because it
+//! removes much of the error for its evidence, or because it is certain; a refusal states its reason.
 
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -14,7 +14,7 @@ use crate::explain::evidence::{
 };
 
 impl Search<'_> {
-    /// Why the last effect of a trial is not accepted; `None` when it is.
+    /// Returns why the last effect of a trial is not accepted; `None` when it is.
     pub fn refusal(trial: &EffectTrial) -> Option<Refusal> {
         if trial.evidence <= 0.0 {
             Some(Refusal::Chance)
@@ -29,8 +29,8 @@ impl Search<'_> {
         }
     }
 
-    /// The greatest strength of the trials of the first round that only their strength may refuse:
-    /// what is compared with its distribution where nothing acts.
+    /// Returns the greatest acceptance score of the trials of the first round that only this score may refuse, to be
+    /// compared with its distribution where nothing acts.
     pub fn greatest_score(outcome: &SearchOutcome) -> f64 {
         let first = outcome.rounds.first().into_iter().flat_map(|round| round.iter());
         first
@@ -40,26 +40,27 @@ impl Search<'_> {
     }
 }
 
-/// Whether the last effect of a trial is larger than what declared figures are good for.
+/// Returns whether the last effect of a trial is larger than the usual errors of declared figures.
 pub(super) fn is_material(trial: &EffectTrial) -> bool {
     let last = trial.last();
     let parameters = trial.fit.effect_parameters(last);
     trial.fit.model.effects[last].is_material(parameters, trial.fit.theta[2])
 }
 
-/// Whether the last effect of a trial may be what its kind says.
+/// Returns whether the parameters of the last effect of a trial are possible for its kind.
 pub(super) fn is_possible(trial: &EffectTrial) -> bool {
     may_be(&trial.fit, trial.last())
 }
 
-/// Evidence beyond which one number of the whole train or line is certain. Where nothing acts it is at most 2, and
-/// where everything declared is a little off, at most 26 for what is not in that world; beside the usual errors 8.
+/// Evidence above which one number of the whole train or line is certain. Where nothing acts the evidence is at most 2;
+/// where all declared figures have small errors, at most 26 for an effect that is absent, and 8 jointly with the usual
+/// errors.
 pub(super) const CERTAIN: f64 = 30.0;
-/// Fewer runs agree on nothing.
+/// Least number of runs that can agree on an effect.
 pub(super) const CERTAIN_RUNS_MIN: usize = 3;
 
-/// Whether an effect of a fitted model is more than chance and more than what declared figures are good for: it
-/// takes much from the error for its evidence, or is certain.
+/// Returns whether an effect of a fitted model is more than chance and more than the usual errors of declared figures
+/// explain: it removes much of the error for its evidence, or is certain.
 pub(super) fn is_accepted(fit: &Fit, index: usize, evidence: f64, reduction: f64) -> bool {
     acceptance_score(evidence, reduction) > SCORE_MIN && is_shown(fit, index)
         || is_certain(fit, index, evidence, reduction, false)
@@ -78,9 +79,9 @@ pub fn deciding_score(
     if is_certain { score.max(SCORE_MIN) } else { score }
 }
 
-/// Whether an effect is certain, however little it takes from the error: strong evidence for one number of the
-/// whole train or line, less of it where it takes more, which the runs agree on. What is chosen among many must take
-/// more from the error. Where a kind may be certain at all, its [policy](policy_of) says.
+/// Returns whether an effect is certain, however little of the error it removes: the runs agree on one number of the
+/// whole train or line with strong evidence, or with less evidence where it removes more. An effect that was chosen
+/// among many must remove more of the error. The [policy](policy_of) of a kind states where it may be certain at all.
 pub(super) fn is_certain(
     fit: &Fit,
     index: usize,
@@ -97,19 +98,19 @@ pub(super) fn is_certain(
         Certainty::Never => false,
     };
     let is_doubtful = policy.uncertain_beside.iter().any(|kind| fit.model.has(*kind));
-    // Among the usual errors is the map's.
+    // The usual errors include the map's.
     let is_left = !is_beside_usual_errors
         && is_left_by_moved_places(effect)
         && fit.model.effects.iter().any(moves_places);
     let needs_the_score = !may_be_certain || is_doubtful || is_left;
-    // The size of a form hangs on its shape, what it explains does not.
+    // The size of a form depends on its shape, its gain does not.
     let runs_agree = || match effect.kind() {
         EffectKind::Unknown => {
             let size = fit.model.ranges()[index].start;
             let gain = (evidence + penalty(fit, index)).max(0.0);
             gain.sqrt() > CERTAIN_STDS * scatter_factor(fit, size)
         }
-        // Else it is not shown.
+        // `is_shown` asks for it.
         _ if is_by_run => true,
         _ => stds_from_none(fit, index) > CERTAIN_STDS,
     };
@@ -133,7 +134,8 @@ pub(super) fn moves_places(effect: &SharedHypothesis) -> bool {
     effect.is_gradient() || effect.nature().changes_speed_scale
 }
 
-/// Whether the remainder of what [moves places](moves_places) looks like an effect, whose place was chosen.
+/// Returns whether the chosen place of an effect may only be the remainder of another effect that [moves
+/// places](moves_places).
 pub(super) fn is_left_by_moved_places(effect: &SharedHypothesis) -> bool {
     policy_of(effect.kind()).is_left_by_moved_places && is_chosen_among_many(effect)
 }
@@ -149,9 +151,9 @@ fn stds_from_none(fit: &Fit, index: usize) -> f64 {
     size / deviations(fit).std[fit.model.ranges()[index].start]
 }
 
-/// Whether an effect shows in enough runs: what has no name must show in several where there are several, for one of
-/// them has some form of its own, and the runs agree on what is one number a run, which other numbers of theirs may
-/// happen to follow.
+/// Returns whether an effect shows in enough runs. A form without a name must show in several runs where there are
+/// several, since some form fits one of them. An effect that depends on one number per run must differ clearly from no
+/// effect, since other numbers of the runs may follow that number by chance.
 fn is_shown(fit: &Fit, index: usize) -> bool {
     let effect = &fit.model.effects[index];
     if fit.runs.len() < CERTAIN_RUNS_MIN {
@@ -173,12 +175,12 @@ fn runs_that_show(fit: &Fit, parameter: usize) -> f64 {
     if squares > 0.0 { sum * sum / squares } else { 0.0 }
 }
 
-/// Why an effect of a fitted model is not what its kind says.
+/// Returns why the parameters of an effect are impossible for its kind.
 pub(super) fn contradiction_of(fit: &Fit, index: usize) -> Option<&'static str> {
     fit.model.effects[index].contradiction(fit.effect_parameters(index))
 }
 
-/// Whether an effect of a fitted model may be what its kind says.
+/// Returns whether the parameters of an effect are possible for its kind.
 pub(super) fn may_be(fit: &Fit, index: usize) -> bool {
     contradiction_of(fit, index).is_none() && at_bound(fit, index).is_none()
 }

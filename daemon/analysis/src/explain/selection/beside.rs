@@ -1,8 +1,8 @@
-//! Effects that are certain beside the usual errors of everything declared.
+//! Effects that are certain jointly with the usual errors of all declared figures.
 //!
-//! Gradients of a map, scales of forces, their lateness, loads and winds of single runs err in every dataset. What
-//! is left of an effect beside all of them is certain or is not, however much of the error they make: they are part
-//! of the model here, with the spread that declared figures have, and integrated out.
+//! In every dataset the map's gradients, the scales and lateness of forces, and the loads and winds of single runs have
+//! errors. These errors are part of the model here, with their usual spread, and integrated out. An effect that is
+//! still evident is certain, however little of the open-loop error it removes.
 
 use std::sync::Arc;
 
@@ -26,7 +26,7 @@ use crate::explain::evidence::Fit;
 use crate::explain::places::SURVEYED;
 use crate::explain::places::span_m;
 
-/// Whether some evidence makes the last effect of a trial certain beside the usual errors.
+/// Returns whether some evidence makes the last effect of a trial certain jointly with the usual errors.
 pub fn is_certain_beside(trial: &EffectTrial, evidence: f64) -> bool {
     is_material(trial)
         && is_possible(trial)
@@ -44,13 +44,13 @@ fn freed_figures(fit: &Fit) -> impl Iterator<Item = &'static DeclaredFigure> {
     kinds.flat_map(|kind| policy_of(kind).frees)
 }
 
-/// Times at most that the length over which steps are rounded is found again, and the share by which what it changes
-/// may be off.
+/// Greatest number of searches for the length over which gradient steps are rounded, and the share of the step
+/// correction that may remain wrong.
 const ROUNDING_TURNS: usize = 3;
 const ROUNDING_SHARE: f64 = 0.1;
 
 impl Search<'_> {
-    /// Searches for effects with the usual errors in the model.
+    /// Fits the model of the search jointly with the usual errors; a finished fit of the same model is returned again.
     pub fn beside_usual_errors(&self, outcome: &mut SearchOutcome) -> Arc<Beside> {
         let fit = &outcome.fit;
         if let Some((from, beside)) = &outcome.beside
@@ -112,10 +112,10 @@ impl Search<'_> {
         }
     }
 
-    /// Takes in what is certain beside the usual errors; false for nothing.
+    /// Accepts an effect that is certain jointly with the usual errors; returns false without one.
     ///
-    /// It is looked for with the map's error in the shape that it has without it, and judged with all of it free
-    /// where it may be certain: freed, the map holds less of the effect.
+    /// The search keeps the map's error in the shape fitted without the effect. A candidate that may be certain is
+    /// judged with every number of the map's error free: then the map explains less of the effect.
     pub(super) fn take_certain_beside(&self, outcome: &mut SearchOutcome) -> bool {
         let beside = &self.beside_usual_errors(outcome).fit;
         if outcome.is_full() || self.problem.runs.len() < CERTAIN_RUNS_MIN {
@@ -164,8 +164,9 @@ impl Search<'_> {
         self.problem.grown(&self.problem.again(fit, beside.noise), usual)
     }
 
-    /// A trial with every number of the map's error free; its evidence is the least under the noise that is left
-    /// with it and without it. What all runs share of the map's error is in the model.
+    /// Returns a trial with every number of the map's error free. Its evidence is the smaller of that under the noise
+    /// with the effect and that under the noise without it. The part of the map's error that all runs share is in the
+    /// model.
     fn with_map_free(&self, beside: &Fit, trial: &EffectTrial) -> EffectTrial {
         let grown = self.problem.grown(beside, [trial.last_parts()]);
         let free = Self::trial(beside, self.problem.with_own_noise(&grown), trial.kind);
@@ -176,9 +177,9 @@ impl Search<'_> {
         EffectTrial { evidence: own.min(alike), reduction: trial.reduction, ..free }
     }
 
-    /// Drops what does not stand beside the usual errors: a force outside the library that explains no more than
-    /// chance there, an effect of it that runs to a bound of what is looked for, and what was certain until others
-    /// came. False for nothing.
+    /// Drops an effect that does not stand jointly with the usual errors: a force outside the library that explains no
+    /// more than chance there, an effect of the library that runs to a bound of its range there, and an effect that was
+    /// certain until others were accepted. Returns false without one.
     pub(super) fn drop_fallen(&self, outcome: &mut SearchOutcome) -> bool {
         let joint = self.beside_usual_errors(outcome);
         let beside = &joint.fit;
@@ -199,7 +200,7 @@ impl Search<'_> {
             if effects[index].place().windows.is_some() && joint.is_as_loads_are(index) {
                 return Some((index, Refusal::UsualLoads));
             }
-            // A form may be greatest where what it follows ends.
+            // A form may be greatest where its covariate's range ends.
             let may_fall = kind != EffectKind::Unknown && at_bound(&outcome.fit, index).is_none();
             let bound = at_bound(beside, index).filter(|_| may_fall);
             Some((index, Refusal::AtBound(bound?)))

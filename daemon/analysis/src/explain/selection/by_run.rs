@@ -6,13 +6,13 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::explain::evidence::{Fit, FitProblem, PRIOR_RUNS, RunData, RunNormal, UpdatedModel};
 
-/// A parameter at its bound is held there to this share of what is looked for.
+/// Standard deviation, as a share of its range, with which a parameter at a bound is held there.
 const HELD_SHARE: f64 = 1e-4;
-/// Less runs than these say nothing of each other.
+/// Least number of runs whose scatter says anything.
 const RUNS_MIN: usize = 2;
 
-/// Moves of the first `count` parameters when each run is left out, to second order, with all
-/// others held; of a run without which they are not determined nothing.
+/// Returns the changes of the first `count` parameters when each run is left out, to second order, with all others
+/// held. A run without which they are not determined has no entry.
 fn moves_without_each_run(
     information: &DMatrix<f64>,
     runs: &[RunNormal],
@@ -30,9 +30,9 @@ fn first(matrix: &DMatrix<f64>, count: usize) -> DMatrix<f64> {
     matrix.view((0, 0), (count, count)).into_owned()
 }
 
-/// The parameters fitted without each run, to second order and within their bounds: what the other
-/// runs say of it. What they do not determine is at none, but a parameter of a single run (its wind, a load
-/// in it) stays as it was fitted: it says nothing of other runs. With a single run all stay.
+/// Returns the parameters fitted without each run, to second order and within their bounds: a prediction for that run
+/// from the others. A parameter that the others do not determine has no effect; a parameter of a single run (its wind,
+/// its load) stays as it was fitted, since it says nothing of other runs. With a single run all stay.
 pub fn without_each_run(problem: &FitProblem, fit: &Fit) -> Vec<Vec<f64>> {
     let count = fit.theta.len();
     if fit.runs.len() < RUNS_MIN {
@@ -57,7 +57,7 @@ pub fn without_each_run(problem: &FitProblem, fit: &Fit) -> Vec<Vec<f64>> {
                 information[(i, i)] += (HELD_SHARE * width).powi(-2);
                 continue;
             }
-            // As wide as what is looked for: a flat prior's variance.
+            // A flat prior's variance: as wide as the parameter's range.
             let weight = 12.0 / width.powi(2);
             information[(i, i)] += weight;
             pull[i] += weight * (effect.none() - fit.theta[i]);
@@ -97,9 +97,9 @@ pub fn few_runs_factor(runs: usize) -> f64 {
 pub struct Deviations {
     /// Standard deviations, of which 1.96 make a 95 % interval.
     pub std: Vec<f64>,
-    /// Covariance by likelihood and scatter, without what the form and the map add.
+    /// Covariance by likelihood and scatter, without the shares of the form and the map.
     pub covariance: DMatrix<f64>,
-    /// c beside what else is in the fit: what is a share of it is a share of this.
+    /// c of the same fit, to which an effect refers that is a share of c.
     pub c: f64,
 }
 
@@ -177,8 +177,8 @@ fn deviations_of_first(fit: &Fit, count: usize) -> Deviations {
     Deviations { std, covariance: scaled, c: fit.theta[2] }
 }
 
-/// Returns the standard deviations of the first parameters of a model by their covariance and what the forms of its
-/// effects and the map add.
+/// Returns the standard deviations of the first parameters of a model by their covariance, enlarged by the errors of
+/// the effects' forms and of the map.
 pub fn std_with_forms(covariance: &DMatrix<f64>, model: &UpdatedModel, theta: &[f64]) -> Vec<f64> {
     let count = covariance.nrows();
     let mut std: Vec<f64> = (0..count).map(|i| covariance[(i, i)].sqrt()).collect();

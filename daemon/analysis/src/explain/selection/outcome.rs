@@ -11,7 +11,7 @@ use crate::explain::effects::SharedHypothesis;
 use crate::explain::evidence::{Fit, acceptance_score};
 use crate::statistics::rms;
 
-/// Named effects at most.
+/// Greatest number of named effects.
 const EFFECTS_MAX: usize = 4;
 
 /// One candidate, fitted together with everything accepted so far.
@@ -21,14 +21,14 @@ pub struct EffectTrial {
     pub kind: EffectKind,
     /// The fitted model; the candidate is its last effect.
     pub fit: Fit,
-    /// Decrease of -2 log likelihood by it, less its price: what kinds are compared by.
+    /// Decrease of -2 log likelihood by the candidate, less its price; kinds are compared by it.
     pub bic_gain: f64,
-    /// The same after the discount for errors that all runs share: what must be more than chance.
+    /// The same after the discount for errors that all runs share; it must be more than chance.
     pub evidence: f64,
-    /// Share of the open-loop error that it takes away, of the fit runs and of each by what the others
-    /// say of it, whichever is less; 0 where the evidence does not ask for it.
+    /// Share of the open-loop error that it removes: the smaller of that over the fit runs as fitted, and that over
+    /// each run as predicted from the others; 0 where the evidence does not ask for it.
     pub reduction: f64,
-    /// Whether its kind has this one structure, whatever is left to explain.
+    /// Whether its kind has this one structure only, independent of the remaining residual.
     pub is_only: bool,
 }
 
@@ -59,17 +59,17 @@ pub(super) fn round_of(mut trials: Vec<EffectTrial>) -> SearchRound {
     trials.into()
 }
 
-/// A model with the usual errors beside it.
+/// A model fitted jointly with the usual errors.
 #[derive(Clone)]
 pub struct Beside {
-    /// Fitted, with the usual errors as its last effects, under what loads and winds make of the runs.
+    /// The fit: the usual errors are its last effects, and loads and winds of the runs are integrated out.
     pub fit: Fit,
-    /// How many of the last parameters all runs share.
+    /// Number of the last parameters that all runs share.
     pub shared: usize,
 }
 
 impl Beside {
-    /// Whether it is a fitted model with the usual errors beside it.
+    /// Returns whether it belongs to a fitted model with the parameters `from`.
     pub(super) fn is_of(&self, fit: &Fit, from: &[f64]) -> bool {
         let mut effects = fit.model.effects.iter().zip(&self.fit.model.effects);
         fit.theta == from && effects.all(|(one, other)| Arc::ptr_eq(one, other))
@@ -106,28 +106,29 @@ pub struct SearchOutcome {
     pub base: Fit,
     /// The model with all accepted effects.
     pub fit: Fit,
-    /// The same where it explains most, before usual errors beside it moved it: how sure effects are.
+    /// The model at its greatest likelihood, before the joint fit with the usual errors moved it: the standard
+    /// deviations come from it.
     pub likeliest: Fit,
     /// The rounds; the last is the one in which nothing more was accepted.
     pub rounds: Vec<SearchRound>,
-    /// Where several effects were found, what was tried in the place of each.
+    /// Where several effects were found, the trials in the place of each.
     pub instead: Vec<(EffectKind, SearchRound)>,
     /// Kinds that the data do not allow to test, and why.
     pub not_testable: Vec<(EffectKind, String)>,
     /// Kinds that are certain and small: part of the model, and not named.
     pub small: Vec<EffectKind>,
-    /// Kinds that are certain beside the usual errors, with what was tried beside them.
+    /// Kinds that are certain jointly with the usual errors, with the trials of the round that found them.
     pub certain: Vec<(EffectKind, SearchRound)>,
-    /// Kinds that were found and did not stand beside the usual errors, and why; not looked for again.
+    /// Kinds that were found and did not stand jointly with the usual errors, and why; they are not looked for again.
     pub fallen: Vec<(EffectKind, Refusal)>,
     /// Kinds at chosen places that were tried as one number of the whole train or line.
     pub(super) returned: Vec<EffectKind>,
-    /// The parameters of a model that was fitted beside the usual errors last, and what came of it.
+    /// Parameters of the model that was last fitted jointly with the usual errors, and that joint fit.
     pub(super) beside: Option<(Vec<f64>, Arc<Beside>)>,
 }
 
 impl SearchOutcome {
-    /// Whether an effect of the model is named: it is more than a small, certain error of what is declared.
+    /// Returns whether an effect of the model is named: it is more than a small, certain error of a declared figure.
     pub fn is_named(&self, kind: EffectKind) -> bool {
         !self.small.contains(&kind)
     }
@@ -157,7 +158,8 @@ impl SearchOutcome {
         self.is_named(kind) && !self.is_certain(kind)
     }
 
-    /// Whether an effect of the model is certain beside the usual errors, whatever it takes from the error.
+    /// Returns whether an effect of the model is certain jointly with the usual errors, however little of the error it
+    /// removes.
     pub fn is_certain(&self, kind: EffectKind) -> bool {
         self.certain.iter().any(|(certain, _)| *certain == kind)
     }
@@ -172,7 +174,7 @@ impl SearchOutcome {
         Some(self.fit.effect_parameters(self.fit.model.position(kind)?))
     }
 
-    /// The trials of what is certain and small, as they were when it was taken in.
+    /// Returns the trials of effects that are certain and small, from the round that accepted them.
     pub fn small_trials(&self) -> impl Iterator<Item = &EffectTrial> {
         let of = |kind: &EffectKind| {
             let rounds = self.rounds.iter().rev().flat_map(|round| round.iter());

@@ -1,5 +1,5 @@
-//! When a force is looked for outside the library: where the library leaves one, or the noise that is
-//! estimated beside an undeclared force may hold it.
+//! When a force outside the library is looked for: where the library leaves a force, or where the noise estimated with
+//! an undeclared force in the data may hide one.
 
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -12,17 +12,17 @@ use crate::explain::evidence::{EQUAL, Fit, SCORE_MIN};
 use crate::explain::scan::Scan;
 use crate::explain::score::FitErrors;
 
-/// Noise that averages over this many s to more than this share of the basic resistance may hold a force: two to
-/// three times its size where nothing is left.
+/// Noise may hide a force where its average over this many s exceeds this share of the basic resistance: two to three
+/// times the usual share where nothing is left.
 const NOISE_OVER_S: f64 = 60.0;
 const HOLDS_A_FORCE: f64 = 0.05;
-/// A form as it is laid out explains at least this share of what it will with its numbers sought and
-/// fitted: edges lie a quarter of the range apart.
+/// A form with its initial numbers explains at least this share of its gain with fitted numbers: the edges tried lie a
+/// quarter of the range apart.
 const COARSE_SHARE: f64 = 0.25;
 
 impl Search<'_> {
-    /// Whether a form explains more than the kind of the library that explains most, or that kind
-    /// leaves a force that has some form.
+    /// Returns whether a form explains more than the best kind of the library, or that kind leaves a force that has
+    /// some form.
     pub(super) fn asks_for_a_form(&self, scan: &Scan, trials: &[(EffectTrial, &Effect)]) -> bool {
         let best = best_possible(trials);
         let explained = best.map_or(0.0, |best| best.bic_gain);
@@ -31,8 +31,7 @@ impl Search<'_> {
             || a_form_explains_more(scan, explained.max(SCORE_MIN))
     }
 
-    /// Puts a form that the noise holds in the place of what was tried outside the library, where it
-    /// explains more.
+    /// Replaces a trial outside the library by a form that the noise hides, where this form explains more.
     pub(super) fn take_form_that_noise_holds(
         &self,
         base: &Fit,
@@ -74,9 +73,9 @@ impl Search<'_> {
             .flatten()
     }
 
-    /// Looks for a form of what is left, under noises too small to hold it: the noise of a model
-    /// that lacks a large force holds that force. What is found stands in the place of everything
-    /// found before, or beside it, whichever explains more.
+    /// Looks for a form of the remaining force under noises too small to hide it: the noise of a model that lacks a
+    /// large force contains that force. A form that is found replaces all effects found before, or joins them, by which
+    /// explains more.
     pub fn look_under_noise(&self, outcome: &mut SearchOutcome) {
         let models = [outcome.base.clone(), outcome.fit.clone()];
         for base in models.iter().take(1 + usize::from(!outcome.fit.model.effects.is_empty())) {
@@ -96,7 +95,7 @@ impl Search<'_> {
     }
 }
 
-/// The trial that explains most of those that may be what their kinds say.
+/// Returns the possible trial of the library that explains most.
 fn best_possible<'t>(trials: &'t [(EffectTrial, &Effect)]) -> Option<&'t EffectTrial> {
     let trials = trials.iter().map(|(trial, _)| trial);
     let possible =

@@ -1,14 +1,14 @@
-//! Price of an effect, and the worth of its evidence.
+//! Price of an effect, and the discount on its evidence.
 
 use nalgebra::{Cholesky, DMatrix};
 
 use crate::explain::effects::AtBound;
 use crate::explain::evidence::Fit;
 
-/// Price of an effect of a fitted model in -2 log likelihood: each parameter costs the logarithm of
-/// the number of observations (Schwarz 1978), each choice of a structure twice the logarithm of the
-/// number of structures; what is one number a run is observed once a run. Parameters with a prior of
-/// their own cost what the data narrow them by (Laplace's approximation of the evidence; Rasmussen and
+/// Returns the price of an effect of a fitted model in -2 log likelihood. Each parameter costs the logarithm of the
+/// number of observations (Schwarz 1978), each choice of a structure twice the logarithm of the number of structures.
+/// For an effect that depends on one number per run, a run is one observation. Parameters with a prior of their own
+/// cost the log determinant by which the data narrow them (Laplace's approximation of the evidence; Rasmussen and
 /// Williams 2006, equation 3.32).
 pub fn penalty(fit: &Fit, index: usize) -> f64 {
     let effect = &fit.model.effects[index];
@@ -22,8 +22,8 @@ pub fn penalty(fit: &Fit, index: usize) -> f64 {
     narrowed.unwrap_or_else(by_count) + effect.nature().choice_cost
 }
 
-/// Logarithm of the determinant of the information about an effect's parameters, all others fitted,
-/// over that before the data; `None` when one of them is singular.
+/// Returns the logarithm of the determinant of the information about an effect's parameters, all others fitted, over
+/// that of the prior; `None` when one of them is singular.
 fn narrowed(fit: &Fit, index: usize, prior: &DMatrix<f64>) -> Option<f64> {
     let own = fit.model.ranges()[index].clone();
     let information = fit.information();
@@ -35,8 +35,8 @@ fn narrowed(fit: &Fit, index: usize, prior: &DMatrix<f64>) -> Option<f64> {
     Some(all - log_determinant(rest)? - log_determinant(prior.clone())?)
 }
 
-/// Decrease of -2 log likelihood by an effect of a fitted model, less what errors that all runs
-/// share would bring: (x/s)² becomes x²/(s² + e²), for each parameter.
+/// Returns the decrease of -2 log likelihood by an effect of a fitted model, less the decrease that errors shared by
+/// all runs would bring: (x/s)² becomes x²/(s² + e²), for each parameter.
 pub fn discounted(fit: &Fit, index: usize, decrease: f64) -> f64 {
     let effect = &fit.model.effects[index];
     let shared = effect.nature().shared_error;
@@ -48,7 +48,7 @@ pub fn discounted(fit: &Fit, index: usize, decrease: f64) -> f64 {
     decrease / (1.0 + each * (shared / effect.size(parameters)).powi(2))
 }
 
-/// The parameter of effect number `index` that lies at a bound of what is looked for.
+/// Returns the parameter of effect number `index` that lies at a bound of its range.
 pub fn at_bound(fit: &Fit, index: usize) -> Option<AtBound> {
     fit.model.effects[index].at_bound(fit.effect_parameters(index))
 }

@@ -4,7 +4,7 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use crate::explain::effects::AtBound;
 
-/// A smaller share of the error is what an effect is refused for, a larger one its evidence.
+/// Share of the error below which a weak effect is refused for removing too little, above for too little evidence.
 const LITTLE: f64 = 0.2;
 
 /// Why an effect is not accepted.
@@ -12,22 +12,22 @@ const LITTLE: f64 = 0.2;
 pub enum Refusal {
     /// Its evidence is negative.
     Chance,
-    /// It is smaller than what declared figures are good for.
+    /// It is smaller than the usual errors of declared figures.
     Immaterial,
-    /// A parameter lies at the bound of what is looked for: these data do not hold it.
+    /// A parameter lies at a bound of its range: these data do not determine it.
     AtBound(AtBound),
     /// The fitted values contradict the kind.
     Contradiction(&'static str),
     /// It changes the mass of single runs no more than loads usually do, which explains it.
     UsualLoads,
-    /// This kind explains more together with the usual errors.
+    /// This kind explains more jointly with the usual errors.
     GivesWay(EffectKind),
-    /// For its evidence it takes too little from the error, this share of it.
+    /// It removes too little of the error for its evidence, this share of it.
     Weak(f64),
 }
 
 impl Refusal {
-    /// Whether all but its name speaks for the effect: something is left to explain.
+    /// Returns whether only the kind is in doubt: something is left to explain.
     pub fn leaves_a_residual(&self) -> bool {
         matches!(self, Refusal::AtBound(_) | Refusal::Contradiction(_))
     }

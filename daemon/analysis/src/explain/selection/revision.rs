@@ -1,4 +1,4 @@
-//! Retrial of accepted effects beside those that came after them.
+//! Retrial of accepted effects jointly with those found later.
 
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -12,9 +12,8 @@ use crate::explain::evidence::{EQUAL, Fit};
 use crate::explain::score::reduction;
 
 impl Search<'_> {
-    /// Takes each effect out in turn and looks whether another kind does better in its place; what was
-    /// tried in the place of each kind that stands after it: of the last, while the others stay, in the round
-    /// that brought it.
+    /// Removes each effect in turn and tries whether another kind explains more in its place. Records the trials in the
+    /// place of each effect; for the last one, while the others stay, they are those of the round that found it.
     pub(super) fn swap(&self, outcome: &mut SearchOutcome, brought_last: SearchRound) {
         let mut tried = Vec::new();
         let kinds = outcome.kinds();
@@ -93,8 +92,9 @@ impl Search<'_> {
         is_better
     }
 
-    /// Drops effects that the others have made needless, and that none of the others stands in for against
-    /// what its own kind says: winds that blow ahead of every train instead of a tunnel's drag.
+    /// Drops effects that the others have made needless, unless one of the others would then have impossible parameters
+    /// (winds that blow against every train instead of a tunnel's drag), and effects that have such parameters
+    /// themselves.
     pub(super) fn prune(&self, outcome: &mut SearchOutcome) {
         let mut index = 0;
         while index < outcome.fit.model.effects.len() && outcome.fit.model.effects.len() > 1 {
@@ -116,7 +116,7 @@ impl Search<'_> {
     }
 }
 
-/// Whether every effect of a fitted model may be what its kind says.
+/// Returns whether the parameters of every effect of a fitted model are possible for its kind.
 fn all_may_be(fit: &Fit) -> bool {
     (0..fit.model.effects.len()).all(|index| may_be(fit, index))
 }

@@ -1,4 +1,4 @@
-//! Forward search with a swap pass and pruning.
+//! Forward search for effects, with a swap pass and pruning.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -13,11 +13,11 @@ use crate::explain::effects::Effect;
 use crate::explain::evidence::{EQUAL, Fit, FitProblem, RunData, UpdatedModel};
 use crate::explain::scan::Scan;
 
-/// Receives the progress, from any thread: share done, and the present work. It may unwind to end the work, which
-/// holds nothing that would have to be put right.
+/// Receives the progress, from any thread: the share done and the present work. It may unwind to end the work, which
+/// leaves nothing to clean up.
 pub type Progress<'p> = &'p (dyn Fn(f64, &str) + Sync);
 
-/// How many steps of a round are done, by all threads together.
+/// Number of finished steps of a round, over all threads.
 pub struct RoundSteps<'s> {
     progress: Progress<'s>,
     round: usize,
@@ -25,7 +25,7 @@ pub struct RoundSteps<'s> {
     done: AtomicUsize,
 }
 
-/// Share done before a round ends: nobody knows how many there will be, and most have few.
+/// Share of the search done before a round ends: the number of rounds is not known, and most searches have few.
 pub fn round_share(round: usize, done: f64) -> f64 {
     let left = 0.5f64.powi(round as i32) * (1.0 - 0.5 * done);
     0.05 + 0.9 * (1.0 - left)
@@ -48,16 +48,16 @@ impl<'s> RoundSteps<'s> {
     }
 }
 
-/// Rounds at most: what is taken in and dropped again must come to an end.
+/// Greatest number of rounds: an effect that is accepted and dropped by turns must come to an end.
 const ROUNDS_MAX: usize = 10;
-/// Less observations than this show nothing.
+/// Least number of observations that can show an effect.
 pub const OBSERVATIONS_MIN: usize = 80;
 
 /// The search over one dataset.
 pub struct Search<'a> {
     /// The fit runs.
     pub problem: &'a FitProblem,
-    /// Runs whose speeds are not looked at.
+    /// Holdout runs, whose speeds the search does not use.
     pub holdout: &'a [RunData],
     /// The declared train.
     pub train: &'a TrainModel,
@@ -114,11 +114,11 @@ impl Search<'_> {
         outcome
     }
 
-    /// Takes in what takes much from the error for its evidence, and what is certain alone, until nothing is left
-    /// that does.
+    /// Accepts effects that remove much of the error for their evidence, and effects that are certain alone, until none
+    /// is left.
     fn take_what_scores(&self, outcome: &mut SearchOutcome) {
         let most = outcome.rounds.len() + ROUNDS_MAX;
-        // And kinds that others took the place of at once.
+        // Kinds that others replaced at once are not tried again either.
         let mut fruitless = outcome.fallen_kinds();
         while !outcome.is_full() && outcome.rounds.len() < most {
             let trials = self.round(&outcome.fit, &mut outcome.not_testable);
@@ -153,9 +153,8 @@ impl Search<'_> {
         }
     }
 
-    /// The trial to accept: the one with the strongest evidence, or one with about the same that
-    /// takes away more of the open-loop error. What is outside the library must explain more than
-    /// anything in it.
+    /// Returns the trial to accept: the one with the strongest evidence, or one with about the same that removes more
+    /// of the open-loop error. A force outside the library must explain more than every kind of the library.
     pub(super) fn best<'t>(
         &self,
         trials: &'t [EffectTrial],

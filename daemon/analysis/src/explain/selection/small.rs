@@ -1,9 +1,9 @@
-//! Certain and small effects: errors of declared figures that every railway has, which are part of the model
-//! without being named.
+//! Certain and small effects: errors of declared figures that every railway has. They are part of the model, but the
+//! answer does not name them.
 //!
-//! Forces a tenth of a second late, wheels and force sensors a few thousandths off: thousands of samples make
-//! them certain, and they take little from the open-loop error. Left out of the model they would stand in its
-//! noise and hide what matters.
+//! Forces may act a tenth of a second late, wheels and force sensors may be a few thousandths off: thousands of samples
+//! make such errors certain, and they hardly change the open-loop error. A model without them would count them
+//! as noise, which hides important effects.
 
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -17,7 +17,7 @@ use crate::explain::evidence::Fit;
 use crate::explain::score::reduction;
 use crate::statistics::rms;
 
-/// Whether an everyday kind is certain, and only for its size no effect.
+/// Returns whether an everyday kind is certain, and refused only because it is small.
 fn is_certain_and_small(trial: &EffectTrial) -> bool {
     let refusal = Search::refusal(trial);
     let late = trial.fit.model.effects.iter().filter(|it| policy_of(it.kind()).is_late).count();
@@ -59,8 +59,8 @@ impl Search<'_> {
         taken
     }
 
-    /// Names what has turned out to matter beside the effects that were found, and forgets what is small
-    /// where nothing was found, and what is no more certain beside what was.
+    /// Names effects that have turned out to matter jointly with those found. Removes small effects where nothing was
+    /// found, and those that are no longer certain jointly with the effects found.
     pub(super) fn name_or_forget_small(&self, outcome: &mut SearchOutcome) {
         let kinds = outcome.kinds();
         outcome.small.retain(|small| kinds.contains(small));

@@ -1,4 +1,4 @@
-//! Scale of the speeds by each source of evidence alone, and whether they agree.
+//! Scale of the speeds by each source of evidence alone, and whether the sources agree.
 
 use dynocar_shared::HALF_95;
 use nalgebra::Cholesky;
@@ -12,12 +12,13 @@ use crate::explain::evidence::FitProblem;
 pub struct ScaleSources {
     /// By positions.
     pub positions: WithStd,
-    /// By gradients and forces beside the usual errors of what is declared.
+    /// By gradients and forces, jointly with the usual errors of declared figures.
     pub motion: WithStd,
 }
 
 impl ScaleSources {
-    /// Of a finished model with a wrong wheel; `None` without one, or where one of the two says nothing.
+    /// Returns the scales of a finished model with a wrong wheel; `None` without one, or where one of the two sources
+    /// determines nothing.
     pub fn of(problem: &FitProblem, outcome: &SearchOutcome) -> Option<Self> {
         let fit = &outcome.beside.as_ref()?.1.fit;
         let scales = |number: &usize| fit.model.effects[*number].nature().changes_speed_scale;

@@ -1,4 +1,4 @@
-//! Trials of a round: every kind beside the model, fitted, and the best once more under their own noise.
+//! Trials of a round: every kind is fitted jointly with the model, and the best kinds once more under their own noise.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -15,29 +15,29 @@ use crate::explain::score::FitErrors;
 use crate::parallel;
 use crate::statistics::greatest_first;
 
-/// Kinds that get a noise of their own and a second localisation in each round.
+/// Greatest number of kinds that get a noise of their own and a second localisation in each round.
 const FINALISTS: usize = 5;
-/// A finalist's advantage: not far below none, and no less than this share of the greatest.
+/// BIC gain of a finalist: not far below zero, and no less than this share of the greatest.
 const FINALIST_MIN: f64 = -20.0;
 const FINALIST_SHARE: f64 = 0.1;
-/// The same where only what may come as far as a kind in its place is looked for.
+/// The same where only kinds matter that come near a given kind in its place.
 const RIVAL_SHARE: f64 = 0.25;
-/// Kinds that take away this share of the open-loop error come before the others, and are all that is
-/// looked at again beyond this number of observations, where small things are significant.
+/// Error reduction above which a kind comes before the others. Above this number of observations, where small effects
+/// are significant, only such kinds are looked at again.
 const FINALIST_ERROR_REDUCTION: f64 = 0.02;
 const MANY_OBSERVATIONS: usize = 5_000;
-/// How often a finalist looks again at most.
+/// Greatest number of attempts of a finalist.
 const ATTEMPTS: usize = 3;
-/// Factor of promise: a trial that would not pay its price with this multiple of the decrease that its start
-/// promises is not fitted; one that would not be certain with this multiple of its evidence is not judged.
+/// Factor on a promised gain: a trial that would not pay its price with this multiple of the decrease that its start
+/// promises is not fitted to its end; one that would not be certain with this multiple of its evidence is not judged.
 pub(super) const PROMISE_TIMES: f64 = 2.0;
 
 /// Which kinds are tried.
 #[derive(Clone, Copy)]
 pub(super) struct Asked<'a> {
-    /// Whether one is.
+    /// Whether a kind is tried.
     pub is_asked: &'a dyn Fn(EffectKind) -> bool,
-    /// Only what comes near this one matters.
+    /// Only kinds that come near this one matter.
     pub rivals_of: Option<EffectKind>,
 }
 
@@ -61,7 +61,7 @@ impl Search<'_> {
         self.round_of(base, not_testable, Asked { is_asked: &|_| true, rivals_of: None })
     }
 
-    /// Tries a kind and what could stand in its place.
+    /// Tries a kind and the kinds that could stand in its place.
     pub(super) fn rivals(&self, base: &Fit, kind: EffectKind) -> Vec<EffectTrial> {
         let asked = Asked { is_asked: &|_| true, rivals_of: Some(kind) };
         self.round_of(base, &mut Vec::new(), asked)
@@ -111,7 +111,7 @@ impl Search<'_> {
         finished
     }
 
-    /// Tries every kind that the model does not have yet, what is outside the library last.
+    /// Tries every kind that the model does not have yet, forces outside the library last.
     fn try_all(
         &self,
         base: &Fit,
@@ -151,8 +151,8 @@ impl Search<'_> {
         trials
     }
 
-    /// The best candidate of a kind, beside everything accepted so far; what promises less than a gain is not
-    /// fitted to its end.
+    /// Returns the best candidate of a kind, jointly with everything accepted so far. A candidate that promises less
+    /// than a gain is not fitted to its end.
     fn try_kind(
         &self,
         base: (&Fit, f64),
@@ -195,8 +195,8 @@ impl Search<'_> {
         best.into_inner().unwrap_or_else(PoisonError::into_inner).map(|it| it.1)
     }
 
-    /// Fits a candidate on top of a fit; its evidence counts against `base`. What promises less than a gain is not
-    /// fitted to its end.
+    /// Fits a candidate on top of a fit; its evidence counts against `base`. A candidate that promises less than a gain
+    /// is not fitted to its end.
     fn attempt(&self, (base, least): (&Fit, f64), onto: &Fit, candidate: Candidate) -> EffectTrial {
         let kind = candidate.hypothesis.kind();
         let may_pay = |fit: &Fit, promised: f64| {

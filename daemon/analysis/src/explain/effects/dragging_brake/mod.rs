@@ -1,7 +1,7 @@
 //! A brake that does not release: a constant force from some instant to the end of the run.
 //!
-//! Where the brake cylinders keep some pressure while no brake is reported, that shows the
-//! windows too, in holdout runs as well, whose speeds are not looked at.
+//! Where the brake cylinders keep some pressure while no brake is reported, this pressure shows the windows too, also
+//! in holdout runs, whose speeds the search does not use.
 
 mod onsets;
 
@@ -18,14 +18,14 @@ use crate::explain::places::{Axis, IntervalEnd, Reach};
 use crate::explain::residual_pressure;
 use crate::explain::scan::{Scan, Tuple};
 
-/// Number of brakes that, in most runs, do not stick equally long after a departure by chance.
+/// Number of dragging brakes that hardly have the same time since departure in most runs by chance.
 const CLOCKED_RUNS_MIN: usize = 3;
 
 #[derive(Clone, Debug)]
 struct Dragging {
     windows: Vec<RunWindow>,
-    /// Of the first windows, whose onsets were found by the speeds: time in s of the run's first
-    /// sample, and its duration in s.
+    /// For the first windows, whose onsets were found by the speeds: time in s of the run's first sample, and its
+    /// duration in s.
     by_speed: Vec<[f64; 2]>,
     /// How many runs were fitted.
     fit_runs: usize,
@@ -42,7 +42,7 @@ pub const POLICY: Policy = Policy {
     ..Policy::USUAL
 };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     let mut candidates = Vec::new();
     let runs = &scan.problem.runs;

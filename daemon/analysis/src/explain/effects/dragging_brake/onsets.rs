@@ -1,21 +1,21 @@
-//! Since when a brake drags in each run, by the speeds.
+//! Time from which a brake drags in each run, by the speeds.
 
 use dynocar_model::terms::brake::{BUILD_UP_S, build_up};
 
 use crate::explain::answer::RunWindow;
 use crate::explain::scan::{Scan, Tuple};
 
-/// Onsets are first looked for at least this far apart in s, and at this many places of a run.
+/// Least distance in s between the onsets that are tried first, and greatest number of them in a run.
 pub(super) const GRID_MIN_S: f64 = 12.0;
 const GRID_PLACES: f64 = 120.0;
 /// Final resolution of each onset in s.
 const FINEST_S: f64 = 2.0;
-/// Motion in s that must follow an onset.
+/// Least motion in s after an onset.
 pub(super) const TAIL_MIN_S: f64 = 40.0;
-/// Least gain that a run must add beyond the choice of its onset: brakes release in nine runs of ten, and twice the
-/// logarithm of ten is this.
+/// Least gain that a run must add beyond the choice of its onset: brakes release in nine runs of ten, and this is twice
+/// the logarithm of ten.
 const RUN_COST: f64 = 4.6;
-/// Onsets are changed at most this many times as often as there are runs.
+/// Greatest number of changes of the onsets beyond the number of runs.
 const CHANGES_BESIDE_RUNS: usize = 4;
 
 /// The onsets of one run, by time, with their tuples.

@@ -1,4 +1,4 @@
-//! The structure: parts, each with a mass factor of its own.
+//! The structure of a mass change: parts, each with a mass factor of its own.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use crate::explain::places::{Axis, IntervalEnd, Reach};
 #[derive(Clone, Debug)]
 pub struct Masses {
     parts: Vec<FactorPart>,
-    /// Of every part, where its ends could be; empty where nothing was chosen.
+    /// For every part, the values where its ends could be; empty where no end was chosen.
     edges: Vec<Vec<f64>>,
     parameters: Vec<Parameter>,
     /// Prior information on the factors; `None` where the parts were chosen one by one.
@@ -27,7 +27,8 @@ pub struct Masses {
 }
 
 impl Masses {
-    /// One part with where its ends could be, and twice the logarithm of what it was chosen from.
+    /// Returns one part with the values where its ends could be, and twice the logarithm of the number of its
+    /// alternatives.
     pub fn new(part: FactorPart, edges: Vec<f64>, choice_cost: f64) -> Self {
         let mut masses = Masses {
             parts: Vec::new(),

@@ -1,5 +1,5 @@
-//! Another mass than declared: between certain places in one direction, or in certain sections
-//! of time of a run. Mass changes while the train stands.
+//! A mass that differs from the declared one: between certain places in one direction, or in certain windows of time of
+//! a run. The mass changes only while the train stands.
 
 mod masses;
 mod parts;
@@ -17,14 +17,14 @@ use crate::parallel;
 use masses::Masses;
 use parts::{Along, FactorPart, STATION_M, STOP_MIN_S, stations, stops};
 
-/// Sections or windows at most.
+/// Greatest number of sections or windows.
 const PARTS_MAX: usize = 5;
 
-/// Loads differ from run to run, so it is never certain.
+/// Loads differ from run to run, so that a change of mass is never certain.
 pub const POLICY: Policy =
     Policy { certainty: Certainty::Never, is_sought_beside_usual_errors: false, ..Policy::USUAL };
 
-/// Structures for the data at hand.
+/// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     let mut candidates = Vec::new();
     let sections = all_sections(scan);

@@ -1,4 +1,4 @@
-//! Where a mass holds: it changes only while the train stands.
+//! Part of the line or of a run where a mass holds: it changes only while the train stands.
 
 use dynocar_model::terms::extra::Covariate;
 use dynocar_model::track::MassSection;
@@ -8,17 +8,17 @@ use crate::explain::evidence::RunData;
 use crate::explain::places::span_m;
 use crate::explain::scan::Scan;
 
-/// Standing for less than this in s lets nobody on or off.
+/// Shortest stop in s at which people get on or off.
 pub const STOP_MIN_S: f64 = 8.0;
 /// Stops within this distance in m are one station.
 pub const STATION_M: f64 = 350.0;
 
-/// Where one factor holds: from one end to the other.
+/// Part where one mass factor holds, from one end to the other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FactorPart {
     /// Both ends: chainages in m or times in s since the run's first sample.
     pub ends: [f64; 2],
-    /// Along what.
+    /// The axis of the ends.
     pub along: Along,
 }
 

@@ -1,5 +1,5 @@
-//! A residual that is real but fits no kind of the library: an extra force in a range of some
-//! covariate. It is not an explanation; it says where an explanation is to be looked for.
+//! A residual that is real but fits no kind of the library: an extra force in a range of some covariate. It is not an
+//! explanation; it shows where to look for one.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -34,8 +34,7 @@ struct Band {
     choice_cost: f64,
 }
 
-/// The ranges in which an extra force explains most, one of each covariate, with what it explains;
-/// the best first.
+/// Returns for each covariate the range in which an extra force explains most, with its gain; the best first.
 pub fn bands(scan: &Scan) -> Vec<(f64, Candidate)> {
     let bands = parallel::of_each(&AXES, |&axis| best_band(scan, axis));
     let mut bands: Vec<(f64, Candidate)> = bands.into_iter().flatten().collect();

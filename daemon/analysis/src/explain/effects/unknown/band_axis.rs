@@ -18,7 +18,7 @@ pub enum BandAxis {
     Run,
 }
 
-/// All of them.
+/// All axes.
 pub const AXES: [BandAxis; 7] = [
     BandAxis::Of(Covariate::Speed),
     BandAxis::Of(Covariate::Chainage),

@@ -1,4 +1,4 @@
-//! A force of a form of its own, as a fit knows it.
+//! A force of some form outside the library, with the numbers that a fit estimates.
 
 use std::sync::Arc;
 
@@ -18,14 +18,14 @@ use crate::explain::places::{Axis, IntervalEnd, Reach};
 use crate::explain::scan::Scan;
 use crate::statistics::span;
 
-/// A force counts from this size in N/kN on.
+/// Least size in N/kN of a force that counts.
 const LEAST_N_PER_KN: f64 = 0.1;
-/// A share of a covariate's range by which an edge is surely moved little.
+/// Share of a covariate's range by which an edge is moved, small enough not to matter.
 const EDGE_FINE_SHARE: f64 = 1e-3;
-/// A force lives where it is at least this share of its greatest.
+/// A force acts where it is at least this share of its greatest value.
 const LIVES_SHARE: f64 = 0.1;
 
-/// The structure: which factors, and which of their numbers are fitted.
+/// The structure: the factors, and which of their numbers are fitted.
 #[derive(Clone, Debug)]
 pub struct FormForce {
     /// Factors with the numbers that they start from.
@@ -72,7 +72,7 @@ impl FormForce {
             }
         }
         let (greatest, place) = lives(extra, scan);
-        // An edge that was sought costs what a number that is fitted does.
+        // An edge that was sought costs as much as a fitted number.
         let sought: usize = extra.factors.iter().map(|factor| edges(factor.form)).sum();
         let observations = scan.fit.observations().max(2) as f64;
         let force = FormForce {

@@ -1,8 +1,8 @@
-//! Which forms an unexplained force may have: every form of one covariate, and products of two.
+//! Forms that are tried for an unexplained force: every form of one covariate, and products of two.
 //!
-//! A form is linear in its size, so that what it explains follows from one whitened shape; what
-//! else it holds is laid out on a grid here and fitted later. The kinds of the library are not
-//! tried again: a force in proportion to traction, a decay from the start, places.
+//! A form is linear in its size, so that its gain follows from one whitened shape; its other numbers are tried on a
+//! grid here and fitted later. The kinds of the library are not tried again: a force in proportion to traction, a decay
+//! from the start, places.
 
 use dynocar_model::terms::extra::{Covariate, CovariateFactor, ExtraResistance, Form};
 
@@ -14,13 +14,13 @@ use crate::explain::scan::Scan;
 use crate::parallel;
 use crate::statistics::greatest_first;
 
-/// Speed forms that products are tried with, beside its first and second power.
+/// Number of forms of the speed that products are tried with, in addition to its first and second power.
 const BEST_FOR_PRODUCTS: usize = 3;
-/// Structures whose numbers are sought before they are fitted, and how many of these may share their
-/// first factor: else the variants of one crowd out the others.
+/// Number of structures whose numbers are sought before they are fitted, and how many of these may share their first
+/// factor: otherwise the variants of one structure would displace the others.
 const REFINED: usize = 8;
 const REFINED_ALIKE: usize = 2;
-/// Exponents of the speed in a product that are tried as they are: one number less is to be estimated.
+/// Exponents of the speed in a product that are tried without a fit: one number less is estimated.
 const WHOLE_EXPONENTS: [f64; 2] = [1.0, 2.0];
 
 /// Returns the greatest gain of a form beyond its price, before its numbers are fitted.

@@ -1,30 +1,30 @@
-//! A covariate over the fit runs, the forms of it that are tried, and which numbers of these are estimated.
+//! A covariate over the fit runs, the forms of it that are tried, and the numbers of these that are estimated.
 
 use dynocar_model::terms::extra::{Covariate, CovariateFactor, Form};
 
 use crate::explain::evidence::RunData;
 use crate::explain::scan::Scan;
 
-/// Number of bins that shows too little, or a share of them where there are few.
+/// Number of bins that is too small to show anything, or share of them where there are few bins.
 const FEW_BINS: usize = 8;
 const FEW_SHARE: f64 = 0.03;
 
 /// Values of a covariate over all bins of the fit runs.
 pub struct KnownCovariate {
-    /// Which.
+    /// The covariate.
     pub of: Covariate,
     /// By run and bin; `NaN` where it is not known.
     pub values: Vec<Vec<f64>>,
     /// Least value.
     pub low: f64,
-    /// Of less, there are too few values to show anything.
+    /// Value below which there are too few bins to show anything.
     pub least: f64,
     /// Greatest value.
     pub high: f64,
 }
 
 impl KnownCovariate {
-    /// `None` where it is known nowhere or is the same throughout.
+    /// Returns the values of a covariate; `None` where it is known nowhere or does not vary.
     pub fn of(scan: &Scan, of: Covariate) -> Option<Self> {
         let of_run =
             |run: &RunData| run.bins.iter().map(|bin| run.covariate(of)[bin.middle()]).collect();

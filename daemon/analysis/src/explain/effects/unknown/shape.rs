@@ -16,11 +16,11 @@ pub struct TriedShape {
     pub gain: f64,
     /// The same less the price of its numbers.
     pub worth: f64,
-    /// The size in N/kN with which it explains most.
+    /// The size in N/kN with the greatest gain.
     pub n_per_kn: f64,
     /// The form.
     pub factors: Vec<CovariateFactor>,
-    /// Whether exponents stay what they are and are no numbers to be fitted.
+    /// Whether exponents are held and not fitted.
     pub holds_exponents: bool,
 }
 
@@ -29,7 +29,7 @@ pub struct Ground<'s> {
     scan: &'s Scan<'s>,
     /// The covariates that vary.
     pub known: Vec<KnownCovariate>,
-    /// By run and bin: acceleration in m/s² that 1 N/kN gives.
+    /// By run and bin: acceleration in m/s² by 1 N/kN.
     per_unit_mps2: Vec<Vec<f64>>,
     /// Price of a number (Schwarz).
     number_cost: f64,

@@ -1,4 +1,4 @@
-//! The search of the fit, and one step of it.
+//! Iteration of the fit, and one step of it.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -11,11 +11,11 @@ use super::{Fit, FitProblem};
 use crate::explain::hypothesis::SharedHypothesis;
 use crate::parallel;
 
-/// Gauss-Newton steps at most.
+/// Greatest number of Gauss-Newton steps.
 const STEPS_MAX: usize = 8;
-/// A predicted decrease of the cost below this ends the search.
+/// Predicted decrease of the cost below which the fit ends.
 const DECREASE_MIN: f64 = 0.02;
-/// Turns in which what sets the runs apart is found.
+/// Number of turns that estimate the loads and winds of the runs.
 const APART_TURNS: usize = 2;
 
 impl FitProblem {
@@ -56,8 +56,8 @@ impl FitProblem {
         self.grown_if(fit, more, |_, _| true)
     }
 
-    /// The same; what does not promise enough stays at its start: `promises` gets the model there, and by how much
-    /// the cost would fall if all were linear.
+    /// Returns the same; a model whose effects do not promise enough stays at its start. `promises` receives the model
+    /// there, and the decrease of the cost if the model were linear.
     pub fn grown_if(
         &self,
         fit: &Fit,
@@ -221,8 +221,9 @@ impl FitProblem {
         false
     }
 
-    /// The damped step within the bounds, and the decrease of the cost that it promises, which is never negative:
-    /// it goes towards the least cost as far as the nearest bound, then on with what is held there held.
+    /// Returns the damped step within the bounds, and the decrease of the cost that it promises, which is never
+    /// negative: it goes towards the least cost as far as the nearest bound, then on with the parameter at that bound
+    /// held.
     pub(super) fn bounded_step(
         &self,
         fit: &Fit,

@@ -1,23 +1,24 @@
-//! A model where many runs, of which not all are in memory, fit it best together.
+//! The best common fit of many runs, of which not all are in memory.
 
 use nalgebra::{Cholesky, DVector};
 
 use super::{Fit, FitProblem, RunNormal};
 
-/// Steps of all runs together at most, after the first, and the part of a standard deviation below which one ends them.
+/// Greatest number of steps of all runs together after the first, and the share of a standard deviation below which a
+/// step is the last.
 const PASSES_MAX: usize = 6;
 const MOVED_MIN: f64 = 0.3;
 
 impl FitProblem {
-    /// A fit where all runs say the same model's parameters, by their normal equations in groups.
+    /// Returns a fit whose parameters come from all runs, by their normal equations in groups.
     ///
-    /// One step leads to the least cost of what is linear. How dead time and lag share a lateness is not: `normals_at`
-    /// gives the equations at other parameters, until none of the first `count` effects that looks back moves by more
-    /// than a part of its standard deviation.
+    /// One step leads to the least cost of a linear model. How dead time and lag share a lateness is not linear:
+    /// `normals_at` gives the equations at other parameters, until none of the first `count` effects that looks back
+    /// moves by more than a share of its standard deviation.
     ///
     /// # Errors
     ///
-    /// When the equations cannot be had.
+    /// When the equations are not available.
     pub fn joined<E>(
         &self,
         fit: &Fit,
@@ -42,8 +43,8 @@ impl FitProblem {
         Ok(joined)
     }
 
-    /// A share of the step to where the normal equations of a fit's groups of runs have their least cost, with what
-    /// they say there to first order.
+    /// Takes a share of the step to the least cost by the normal equations of a fit's groups of runs, and moves these
+    /// equations there to first order.
     fn stepped(&self, fit: &Fit, share: f64) -> Fit {
         let Some((theta, _)) = self.bounded_step(fit, &fit.score(), 0.0) else {
             return fit.clone();
@@ -62,8 +63,7 @@ impl FitProblem {
         fit.runs.iter().fold(prior, |cost, run| cost + run.cost)
     }
 
-    /// A fit where all runs, in groups, say its parameters: a, b and c where all fit best, and the effects moved by
-    /// what is given.
+    /// Returns a fit with a, b and c where all runs, in groups, fit best, and the effects moved by `moved`.
     pub fn with_davis_joined(&self, fit: &Fit, groups: &[RunNormal], moved: &[f64]) -> Fit {
         let all = Fit { runs: groups.to_vec(), ..fit.clone() };
         let (information, score) = (all.information(), all.score());

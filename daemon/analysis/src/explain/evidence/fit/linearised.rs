@@ -44,12 +44,12 @@ impl FitProblem {
         })
     }
 
-    /// The cost of what is left, with the prior.
+    /// Returns the cost of the residuals, with the prior.
     pub(super) fn cost(&self, model: &UpdatedModel, theta: &[f64], left: &[Left]) -> f64 {
         left.iter().fold(self.prior(model, theta).2, |cost, run| cost + run.whitened.cost)
     }
 
-    /// Residuals, regressors and normal equations where a model leaves that.
+    /// Returns residuals, regressors and normal equations at the parameters that left these residuals.
     pub(super) fn linearised(
         &self,
         plan: &Plan,
@@ -98,7 +98,8 @@ impl FitProblem {
         fit
     }
 
-    /// A model with the effects of a fit and one more that is at none, where nothing but what it would change is new.
+    /// Returns a model with the effects of a fit and one more at no effect; only the columns of this effect are
+    /// computed.
     pub(super) fn bordered(&self, plan: &Plan, fit: &Fit, memories: &mut [RunMemory]) -> Fit {
         let mut theta = fit.theta.clone();
         let last = plan.model.effects.len() - 1;
@@ -192,7 +193,8 @@ impl Left {
         Left { whitened, residual }
     }
 
-    /// Normal equations, and the whitened regressors less what the run's own factors would explain.
+    /// Returns the normal equations, and the whitened regressors less the share that the run's own factors would
+    /// explain.
     fn normal(
         &self,
         model: &UpdatedModel,
@@ -239,7 +241,7 @@ impl Fit {
     }
 }
 
-/// Whitens columns; what of them the run's own factors would not explain.
+/// Whitens columns; returns the share of them that the run's own factors would not explain.
 fn whiten(whitener: &BinWhitener, own: &WeightedFilter, columns: &mut [Vec<f64>]) -> Vec<Column> {
     whitener.whiten_all(columns);
     let free = columns.iter().map(|column| own.remove(column, &own.factors(column)));

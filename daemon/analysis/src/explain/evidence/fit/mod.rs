@@ -25,18 +25,18 @@ use crate::parallel;
 use memory::RunMemory;
 pub use prior::{Positions, RunPositions};
 
-/// Standard deviation of the declared a, b, c as share of their size: a weak prior that keeps
-/// directions apart which the runs do not excite.
+/// Standard deviation of the declared a, b, c as a share of their size: a weak prior that separates directions which
+/// the runs do not excite.
 const PRIOR_SHARE: [f64; 3] = [0.4, 0.8, 0.4];
 /// A declared coefficient is wrong by at most this many standard deviations; data that ask for more, or for a
 /// resistance below zero, show a force that the basic resistance does not have.
 const DECLARED_DEVIATIONS_MAX: f64 = 4.0;
-/// A coefficient below none by no more than this share of one is an error of estimation.
+/// Greatest share of its prior deviation by which a coefficient may fall below zero: an error of estimation.
 const BELOW_NONE_MAX: f64 = 0.25;
-/// A coefficient that is held at its bound is known to this share of its prior deviation.
+/// Standard deviation of a coefficient that is held at its bound, as a share of its prior deviation.
 const HELD_SHARE: f64 = 1e-3;
 
-/// The runs that are fitted and what is known beforehand.
+/// The runs that are fitted, and the knowledge before the fit.
 #[derive(Clone, Debug)]
 pub struct FitProblem {
     /// The fit runs.
@@ -114,8 +114,8 @@ pub struct Fit {
     held_information: [f64; 3],
     /// White innovations by run, less the runs' own factors.
     pub innovations: Vec<Vec<f64>>,
-    /// Whitened regressors by run and parameter, less what the runs' own factors would explain;
-    /// empty for a parameter that does not touch the run.
+    /// Whitened regressors by run and parameter, less the share that the runs' own factors would explain; empty for a
+    /// parameter that does not touch the run.
     pub columns: Vec<Vec<Column>>,
     /// Differences of the bins by run, not whitened.
     pub residuals: Vec<Vec<f64>>,
@@ -127,18 +127,18 @@ pub struct Fit {
     factors: Vec<(RunFactors, FactorMatrix)>,
     /// Computed values of each run for the model.
     memories: Arc<[RunMemory]>,
-    /// Errors in m/s of what it predicts, once they are asked for.
+    /// Errors in m/s of its predictions, once somebody asks for them.
     open_loop_mps: OnceLock<[[f64; 3]; 2]>,
 }
 
 impl Fit {
-    /// Errors in m/s of what it predicts, found once.
+    /// Returns the errors in m/s of its predictions, computed once.
     pub fn open_loop_mps(&self, find: impl FnOnce() -> [[f64; 3]; 2]) -> [[f64; 3]; 2] {
         *self.open_loop_mps.get_or_init(find)
     }
 
-    /// Forgets what it holds by observation: what is left says how good the model is, and starts other fits, but is
-    /// no place to look around.
+    /// Drops its series of innovations, columns and residuals: it still states how good the model is, and starts other
+    /// fits, but a scan cannot use it.
     pub fn forget_series(&mut self) {
         self.innovations = Vec::new();
         self.columns = Vec::new();
@@ -147,7 +147,7 @@ impl Fit {
         self.memories = Arc::default();
     }
 
-    /// Information matrix of all runs and the prior, with what is held at its bounds.
+    /// Returns the information matrix of all runs and the prior, with coefficients held at their bounds.
     pub fn information(&self) -> DMatrix<f64> {
         let mut information = self.free_information();
         for (i, held) in self.held_information.iter().enumerate() {
@@ -156,9 +156,9 @@ impl Fit {
         information
     }
 
-    /// The same with nothing held: what the data say of a coefficient at its bound.
+    /// Returns the same with no coefficient held, for the information of the data on a coefficient at its bound.
     ///
-    /// A parameter of which nothing says anything, as the time constant of an effect of no size, is known to be within
+    /// A parameter without any information, such as the time constant of an effect of no size, is known to be within
     /// its bounds.
     pub fn free_information(&self) -> DMatrix<f64> {
         let known = self.runs.iter().map(|run| &run.information);
@@ -259,8 +259,8 @@ impl FitProblem {
         self.prior_deviation[coefficient]
     }
 
-    /// Least and greatest a (0), b (1) or c (2): physical, and within the tolerance of what is
-    /// declared; what is declared as none has no greatest.
+    /// Returns the least and greatest a (0), b (1) or c (2): physically possible, and within the tolerance of the
+    /// declared coefficient. A coefficient that is declared as zero has no greatest value.
     fn declared_bounds(&self, coefficient: usize) -> (f64, f64) {
         let Davis { a, b, c } = self.declared;
         let declared = [a, b, c][coefficient];

@@ -1,7 +1,7 @@
 //! How each effect of a model is handled in a fit.
 //!
-//! Resistances that only add to the others, and gradients, are integrated by themselves for a unit of what they
-//! are proportional to. All others act on the forces together.
+//! Resistances that only add to the others, and gradients, are integrated by themselves for one unit of their factor.
+//! All other effects act on the forces together.
 
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ use crate::explain::hypothesis::{Handling, OnOthers, SharedHypothesis};
 /// An effect with the ranges of its parameters, and the function of each in which the forces are affine.
 pub(super) type Affine<'m> = (&'m SharedHypothesis, Range<usize>, fn(f64) -> f64);
 
-/// A model with how each of its effects is handled.
+/// A model and how each of its effects is handled.
 pub(super) struct Plan<'m> {
     pub model: &'m UpdatedModel,
     pub ranges: Vec<Range<usize>>,
@@ -65,12 +65,12 @@ impl<'m> Plan<'m> {
         (0..self.ranges[number].len()).any(|parameter| effect.touches(parameter, run))
     }
 
-    /// The parameters of what acts together on a run, by their numbers.
+    /// Returns the parameters of the effects that act together on a run, by their numbers.
     pub fn together(&self, run: &RunData) -> impl Iterator<Item = usize> {
         self.acting(run).flat_map(|(_, _, range)| range)
     }
 
-    /// Whether what is known of a run for a model serves another, which has its effects and some more.
+    /// Returns whether the computed values of a run for a model also serve a model with more effects.
     pub fn serves(&self, grown: &Plan, run: &RunData) -> bool {
         let count = self.handlings.len();
         grown.handlings[..count] == self.handlings

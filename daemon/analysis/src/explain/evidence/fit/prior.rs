@@ -47,7 +47,7 @@ impl Positions {
         }
     }
 
-    /// Adds what they say of the scale of the speeds and of how late they are.
+    /// Adds the information of the positions on the scale and the delay of the speeds.
     pub fn add_to(&self, normal: &mut RunNormal, model: &UpdatedModel, theta: &[f64]) {
         let RunNormal { information, score, cost } = normal;
         if let Some((ratio, deviation)) = self.distance_ratio {

@@ -9,8 +9,8 @@ use super::{RunMemory, Scratch, Together, is_near, with_scratch};
 use crate::explain::hypothesis::{Handling, OnOthers, SharedHypothesis};
 
 impl RunMemory {
-    /// By parameter what a unit of it changes, not whitened: a, b, c and gradients by their slopes, the
-    /// others by differences over some steps; empty for a parameter that does not touch the run.
+    /// Returns for each parameter the change of the response by one unit, not whitened: for a, b, c and gradients by
+    /// their slopes, for the others by differences over some steps; empty for a parameter that does not touch the run.
     pub fn columns(&mut self, at: At, steps: &[f64]) -> Vec<Vec<f64>> {
         let mut columns = vec![Vec::new(); at.theta.len()];
         self.act_together(at);
@@ -23,7 +23,7 @@ impl RunMemory {
         columns
     }
 
-    /// Those of the last effect alone, which is at none.
+    /// Returns the columns of the last effect alone, whose parameters are at no effect.
     pub fn columns_of_last(&mut self, at: At, steps: &[f64]) -> Vec<Vec<f64>> {
         let mut columns = vec![Vec::new(); at.theta.len()];
         let last = at.plan.handlings.len() - 1;
@@ -70,7 +70,7 @@ impl RunMemory {
         }
     }
 
-    /// Adds to the columns of what scales the added effects what it changes of these.
+    /// Adds, to the columns of a parameter that scales the added effects, the change of these effects.
     fn columns_of_scale(
         &mut self,
         at: At,

@@ -1,7 +1,8 @@
 //! Response of a model to one run, and its derivatives; unchanged parts are not computed again.
 //!
-//! Of what acts together on a run, one effect in which the forces are affine takes two looks at the samples for
-//! all parameters; where there are more, a slope serves as far as the step that it was taken over.
+//! Effects that act on the forces together cost passes over the samples. Where there is only one on a run and the
+//! forces are affine in it, two passes serve for all its parameters. Where there are several, a slope serves as far as
+//! the step over which it was taken.
 
 mod columns;
 
@@ -16,7 +17,7 @@ use super::super::run_data::RunData;
 use super::plan::{At, Plan};
 use crate::explain::hypothesis::{Handling, SharedHypothesis};
 
-/// The speed in m/s at which a, b and c are compared, and the share of the resistance that changes no slope.
+/// Speed in m/s at which a, b and c are compared, and the share of the resistance that does not change a slope.
 const USUAL_MPS: f64 = 20.0;
 const NEAR_SHARE: f64 = 0.05;
 
@@ -27,7 +28,8 @@ type Known<T> = Arc<(Vec<f64>, T)>;
 #[derive(Clone, Default)]
 pub(super) struct RunMemory {
     together: Together,
-    /// a, b, c and the parameters of what acts together, and by the latter's number what a unit changes.
+    /// Slopes for each parameter of the effects that act together, with a, b, c and the parameters at which they were
+    /// taken.
     slopes: Option<Known<Vec<Vec<f64>>>>,
     /// By effect: parameters but the first, and the bins for a first one of 1 above none.
     added: Vec<Option<Known<Vec<f64>>>>,
@@ -55,11 +57,11 @@ struct Scratch {
 enum Together {
     #[default]
     Unknown,
-    /// Nothing: what is declared stays.
+    /// No effect acts: the declared forces stay.
     Nothing,
-    /// That at none, and by how much it changes with each parameter's affine coordinate.
+    /// Response at no effect, and its change with each parameter's affine coordinate.
     Affine { at: Response, none: Arc<Response>, slopes: Arc<Vec<Option<Response>>> },
-    /// That at some of their parameters.
+    /// Response at some of their parameters.
     At(Vec<f64>, Arc<Response>),
 }
 
@@ -85,7 +87,7 @@ impl RunMemory {
         self.add(at, at.plan.model.scale_of_added(at.theta), bins);
     }
 
-    /// Adds what the effects do that only add something, by a factor.
+    /// Adds the effects that only add a resistance or a gradient, times a factor.
     fn add(&mut self, at: At, scale: f64, bins: &mut [f64]) {
         for (number, effect, range) in at.plan.handled(Handling::Added) {
             let first = scale * (at.theta[range.start] - effect.none());
