@@ -30,7 +30,7 @@ const USUAL: &str = "dynocar";
 /// of the package that it is built from, with the ending of this one's: `dynocar-2` calls
 /// `dynocar-workshop-2`.
 pub fn call(package: &str) -> Command {
-    let mut command = Command::new(beside_this(package).unwrap_or_else(|| package.into()));
+    let mut command = Command::new(next_to_this_program(package).unwrap_or_else(|| package.into()));
     command.arg0(USUAL);
     command
 }
@@ -42,7 +42,7 @@ pub fn called_as(package: &'static str) -> &'static str {
     if is_usual { USUAL } else { package }
 }
 
-fn beside_this(package: &str) -> Option<OsString> {
+fn next_to_this_program(package: &str) -> Option<OsString> {
     let this: PathBuf = std::env::current_exe().ok()?;
     let ending = this.file_name().and_then(OsStr::to_str).map_or("", ending);
     let program = this.parent()?.join(format!("{package}{ending}"));

@@ -176,9 +176,9 @@ fn without_scripts_the_same_pictures_stand_and_no_address_is_named() {
     assert_eq!(browser.value(PICTURES), with_scripts);
     let text = &OF_A_TUNNEL.page;
     // The dataset is named as if it were a picture.
-    let text_beside_name = text.replace("&lt;img src=x", "");
+    let text_without_name = text.replace("&lt;img src=x", "");
     for foreign in ["://", " src=", "@import", "url(\"", "fetch", "XMLHttp", "WebSocket"] {
-        assert!(!text_beside_name.contains(foreign), "{foreign}");
+        assert!(!text_without_name.contains(foreign), "{foreign}");
     }
     // The same command makes the same page, but for the day.
     let again = page_of(&OF_A_TUNNEL.simulated);

@@ -72,10 +72,10 @@ fn a_pulled_pair_settles_where_the_coupling_carries_the_wagon() {
     let mut states = vec![pulled; 800];
     let (plan, disturbances) = (&run.plan, &run.disturbances);
     move_leading_car(&TruePhysics { train: &train, line: &line, plan, disturbances }, &mut states);
-    let beside_mps = |state: &TrueState| state.wheel_speed_mps - SPEED_MPS;
-    let ahead_m = states.iter().map(beside_mps).sum::<f64>() * TRUE_STEP_S;
+    let slip_mps = |state: &TrueState| state.wheel_speed_mps - SPEED_MPS;
+    let ahead_m = states.iter().map(slip_mps).sum::<f64>() * TRUE_STEP_S;
     // Half of the coupling's extension, since the centre of mass has not moved.
     let expected_m = 0.25 * PULL_N / STIFFNESS_N_PER_M;
     assert!((ahead_m - expected_m).abs() < 2e-3 * expected_m, "{ahead_m} m");
-    assert!(states.last().is_some_and(|state| beside_mps(state).abs() < 1e-6));
+    assert!(states.last().is_some_and(|state| slip_mps(state).abs() < 1e-6));
 }

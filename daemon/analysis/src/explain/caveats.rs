@@ -49,7 +49,7 @@ pub fn caveats(
     });
     caveats.extend(courses);
     caveats.extend(effects.iter().filter_map(by_held_out_runs));
-    caveats.extend([worse_held_out(effects, score), small_beside(outcome, effects)]);
+    caveats.extend([worse_held_out(effects, score), small_effects(outcome, effects)]);
     caveats.push(undetermined(search.problem, &outcome.fit, &known.deviations.std));
     caveats.extend(not_held(identifiability));
     caveats
@@ -62,7 +62,7 @@ pub fn trimmed(sentences: &[String]) -> Vec<String> {
 }
 
 /// Describes the certain and small effects beside those that are named; empty without either.
-fn small_beside(outcome: &SearchOutcome, effects: &[EffectAnswer]) -> String {
+fn small_effects(outcome: &SearchOutcome, effects: &[EffectAnswer]) -> String {
     let small: Vec<String> = outcome.small_trials().map(|it| small(outcome, it)).collect();
     if small.is_empty() || effects.is_empty() {
         return String::new();

@@ -5,7 +5,9 @@ use dynocar_shared::vocabulary::{self, EffectKind};
 use super::answer::RunnerUp;
 use super::effects::UNKNOWN;
 use super::evidence::{EQUAL, SCORE_MIN};
-use super::selection::{EffectTrial, Refusal, Search, SearchOutcome, is_certain_beside, penalty};
+use super::selection::{
+    EffectTrial, Refusal, Search, SearchOutcome, is_certain_with_nuisance, penalty,
+};
 use crate::statistics::least_first;
 
 /// Least share of the accepted effect's error reduction, and of the least acceptance score, that a competing hypothesis
@@ -61,7 +63,7 @@ fn comes_close(trial: &EffectTrial, accepted: &EffectTrial, outcome: &SearchOutc
     let last = outcome.rounds.last().into_iter().flat_map(|round| round.iter());
     let left = last.clone().find(|left| left.kind == trial.kind).map_or(0.0, |left| left.evidence);
     let may_be = match Search::refusal(trial) {
-        _ if outcome.is_certain(accepted.kind) => is_certain_beside(trial, trial.bic_gain),
+        _ if outcome.is_certain(accepted.kind) => is_certain_with_nuisance(trial, trial.bic_gain),
         None => true,
         // A trial is strong enough if its acceptance score comes close to the least one, which the accepted effect
         // exceeded.

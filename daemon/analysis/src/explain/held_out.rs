@@ -32,8 +32,8 @@ impl HeldOutRun {
         run: &RunData,
         within: Option<&RunData>,
     ) -> Self {
-        let beside = outcome.beside();
-        let fit = beside.as_ref().map_or(&outcome.fit, |beside| &beside.fit);
+        let joint = outcome.nuisance_fit();
+        let fit = joint.as_ref().map_or(&outcome.fit, |joint| &joint.fit);
         let within = within.filter(|_| !outcome.fit.model.effects.is_empty());
         HeldOutRun {
             score: RunScore::new(run, &outcome.base, &outcome.fit),

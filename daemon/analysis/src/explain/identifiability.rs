@@ -33,9 +33,9 @@ pub fn identifiability(search: &Search, outcome: &SearchOutcome) -> Vec<Identifi
     }
     let information = search.problem.at(&model, theta, outcome.fit.noise).information();
     // Standard deviation of one with some others beside the fitted parameters.
-    let std = |own: usize, beside: Option<usize>| {
+    let std = |own: usize, other: Option<usize>| {
         let free: Vec<usize> =
-            (0..fitted).chain(beside.map(|k| fitted + k)).chain([fitted + own]).collect();
+            (0..fitted).chain(other.map(|k| fitted + k)).chain([fitted + own]).collect();
         let part = information.select_rows(&free).select_columns(&free);
         let covariance = Cholesky::new(part)?.inverse();
         let last = free.len() - 1;

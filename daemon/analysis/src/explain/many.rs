@@ -14,7 +14,7 @@ use dynocar_model::train::{PowerTrain, TrainModel};
 use super::evidence::{Density, Fit, FitProblem, RunData, RunDataError, RunNormal, prepare_at};
 use super::held_out::HeldOutRun;
 use super::over_time::Span;
-use super::selection::{Beside, Search, SearchOutcome};
+use super::selection::{NuisanceFit, Search, SearchOutcome};
 use crate::dataset::{Dataset, Role, Run};
 use crate::parallel;
 
@@ -185,20 +185,20 @@ impl<E: From<RunDataError> + Send> Many<'_, E> {
         outcome: &mut SearchOutcome,
     ) -> Result<bool, E> {
         let problem = search.problem;
-        let Some(joint) = outcome.beside().filter(|_| is_common(&outcome.fit)) else {
+        let Some(joint) = outcome.nuisance_fit().filter(|_| is_common(&outcome.fit)) else {
             return Ok(false);
         };
         (search.progress)(0.95, "reading all runs");
         let fits = [&joint.fit, &outcome.fit, &outcome.base];
-        let [beside, own, base] = self.normals(problem, preparation, fits)?;
+        let [of_joint, own, base] = self.normals(problem, preparation, fits)?;
         let count = outcome.fit.model.effects.len();
-        let fit = problem.joined(&joint.fit, beside, count, |fit| {
+        let fit = problem.joined(&joint.fit, of_joint, count, |fit| {
             let [again] = self.normals(problem, preparation, [fit])?;
             Ok::<_, E>(again)
         })?;
         let effects = 3..outcome.fit.theta.len();
         let moved: Vec<f64> = effects.map(|i| fit.theta[i] - joint.fit.theta[i]).collect();
-        outcome.set_beside(Beside { fit, shared: joint.shared });
+        outcome.set_nuisance_fit(NuisanceFit { fit, shared: joint.shared });
         outcome.fit = problem.with_davis_joined(&outcome.fit, &own, &moved);
         outcome.base = problem.with_davis_joined(&outcome.base, &base, &[]);
         Ok(true)

@@ -142,7 +142,7 @@ fn explained<E: From<RunDataError> + Send>(
         search.look_under_noise(&mut outcome);
     }
     let known = places::settle(&problem, &mut outcome.fit);
-    selection::move_beside_usual_errors(&search, &mut outcome);
+    selection::move_to_nuisance_fit(&search, &mut outcome);
     // A dead time and a lag are separated by the shape of the force, which the search of many runs saw thinned.
     let is_joined = match &many {
         Some(many) => many.join(&search, &preparation, &mut outcome)?,
@@ -158,8 +158,8 @@ fn explained<E: From<RunDataError> + Send>(
         Some(many) => many.spans(),
         None => problem.runs.iter().map(|run| [run.file.clone(), run.file.clone()]).collect(),
     };
-    let beside = outcome.beside();
-    let finished = beside.as_ref().map_or(&outcome.fit, |beside| &beside.fit);
+    let joint = outcome.nuisance_fit();
+    let finished = joint.as_ref().map_or(&outcome.fit, |joint| &joint.fit);
     let courses = over_time::courses(&problem, finished, &spans, &deviations.std);
     let held_out = held_out::by_held_out_runs(
         (&problem, finished),

@@ -71,7 +71,7 @@ fn errors_at<const N: usize>(
         (UpdatedForces::default(), restarts.map(|it| (Prediction::new(), it)));
     fit.model.forces_on_day(run, theta, own, &mut forces);
     let each = ways.each_mut().map(|(prediction, restart)| (prediction, *restart));
-    Prediction::simulate_beside(&run.recording, &forces, each);
+    Prediction::simulate_together(&run.recording, &forces, each);
     ways.map(|(prediction, _)| SpeedError::new(&run.recording, &prediction))
 }
 
@@ -152,8 +152,8 @@ fn open_loop_mps(problem: &FitProblem, fit: &Fit) -> [[f64; 3]; 2] {
                 let [error] = errors_at(fit, theta, (run, own), [Restart::FullRun]);
                 error
             };
-            let is_beside = fit.is_beside_loads_and_winds();
-            [full, window, if is_beside { on_day() } else { full }]
+            let has_own = fit.has_loads_and_winds();
+            [full, window, if has_own { on_day() } else { full }]
         });
         [0, 1, 2].map(|restart| {
             let errors = each.iter().map(|of_run| of_run[restart]);

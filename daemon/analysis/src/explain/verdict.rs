@@ -19,7 +19,7 @@ use super::evidence::p_value;
 use super::held_out::HeldOutEffect;
 use super::hypothesis::{Hypothesis, ReportedValues};
 use super::identifiability::identifiability;
-use super::report::effect::{located, small, verdict_words};
+use super::report::effect::{contradicting_scales, located, small, verdict_words};
 use super::score::{self, PredictionScore};
 use super::selection::{
     Deviations, ScaleSources, Search, SearchOutcome, deciding_score, discounted, few_runs_factor,
@@ -184,7 +184,7 @@ fn effect_answers(
                 meaning: EffectMeaning::new(search.problem, fit, index, &rest),
                 contradiction: apart
                     .filter(|_| effect.nature().changes_speed_scale)
-                    .map(|sources| sources.sentence()),
+                    .map(|sources| contradicting_scales(&sources)),
                 over_time: known.courses(effect.kind()),
                 held_out,
                 runners_up: if effect.kind() == EffectKind::Unknown {

@@ -80,11 +80,11 @@ impl Prediction {
         model: &impl ForceModel,
         restart: Restart,
     ) {
-        Prediction::simulate_beside(recording, model, [(self, restart)]);
+        Prediction::simulate_together(recording, model, [(self, restart)]);
     }
 
     /// Simulates a run in some ways at once: a processor works on one while the other waits for its last speed.
-    pub fn simulate_beside<const N: usize>(
+    pub fn simulate_together<const N: usize>(
         recording: &OpenLoopRecording,
         model: &impl ForceModel,
         mut ways: [(&mut Prediction, Restart); N],

@@ -24,7 +24,7 @@ struct DelayAndLag {
 
 /// Every force acts a little late, and the usual errors hold a lateness; late forces are an error of the record.
 pub const POLICY: Policy = Policy {
-    is_sought_beside_usual_errors: false,
+    is_sought_with_nuisance: false,
     everyday: Some(Everyday { rank: 1, most: f64::INFINITY }),
     is_late: true,
     frees: &[DeclaredFigure::Lateness],
@@ -33,7 +33,7 @@ pub const POLICY: Policy = Policy {
 
 /// A late brake is an error of the record, as late forces are; of the small ones the usual errors hold a part.
 pub const OF_BRAKE: Policy =
-    Policy { is_sought_beside_usual_errors: false, is_late: true, ..Policy::USUAL };
+    Policy { is_sought_with_nuisance: false, is_late: true, ..Policy::USUAL };
 
 /// Proposes a delay of the brake alone.
 pub fn of_brake(scan: &Scan) -> Proposal {

@@ -28,7 +28,7 @@ fn mean_degc(run: &RunData) -> Option<f64> {
 }
 
 /// Each run has one temperature, and also its load and wind, which may follow the temperatures by chance.
-pub const POLICY: Policy = Policy { certainty: Certainty::BesideUsualErrors, ..Policy::USUAL };
+pub const POLICY: Policy = Policy { certainty: Certainty::WithNuisance, ..Policy::USUAL };
 
 /// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {

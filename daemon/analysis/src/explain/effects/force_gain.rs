@@ -18,24 +18,24 @@ enum Gain {
 
 /// Force sensors have small errors: an error of the record that every train has.
 pub const OF_TRACTION: Policy = Policy {
-    is_sought_beside_usual_errors: false,
+    is_sought_with_nuisance: false,
     everyday: Some(Everyday { rank: 3, most: f64::INFINITY }),
     frees: &[DeclaredFigure::Traction],
     ..Policy::USUAL
 };
 /// The usual errors contain a scale of the brake, and a larger one is no small error.
-pub const OF_BRAKE: Policy = Policy {
-    is_sought_beside_usual_errors: false,
-    frees: &[DeclaredFigure::Brake],
-    ..Policy::USUAL
-};
+pub const OF_BRAKE: Policy =
+    Policy { is_sought_with_nuisance: false, frees: &[DeclaredFigure::Brake], ..Policy::USUAL };
 
 /// Proposes a gain of the traction force.
 pub fn of_traction(scan: &Scan) -> Proposal {
     scan.requires_force(|sample| sample.traction_force_n, "traction")?;
     let is_like_inertia = scan.are_inertia_and_traction_alike();
     if is_like_inertia && scan.fit.model.has(EffectKind::RotatingMass) {
-        return Err("beside another rotating mass only braking or a known gradient shows it".into());
+        return Err(
+            "with another rotating mass found, only braking or a known gradient would show it"
+                .into(),
+        );
     }
     Ok(vec![Candidate::new(Gain::Traction { is_like_inertia }, vec![1.0])])
 }

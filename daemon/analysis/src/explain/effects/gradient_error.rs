@@ -44,11 +44,8 @@ struct Profile {
 
 /// An error of the map, whose usual errors are in the model there. A wind along the line acts as the mean of such an
 /// error does, whose other nodes would then explain the usual errors, too.
-pub const POLICY: Policy = Policy {
-    is_sought_beside_usual_errors: false,
-    gives_way_to: &[EffectKind::Wind],
-    ..Policy::USUAL
-};
+pub const POLICY: Policy =
+    Policy { is_sought_with_nuisance: false, gives_way_to: &[EffectKind::Wind], ..Policy::USUAL };
 
 /// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {

@@ -20,7 +20,7 @@ struct Shift {
 }
 
 /// An error of the map: the usual errors already contain it.
-pub const POLICY: Policy = Policy { is_sought_beside_usual_errors: false, ..Policy::USUAL };
+pub const POLICY: Policy = Policy { is_sought_with_nuisance: false, ..Policy::USUAL };
 
 /// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {

@@ -52,7 +52,7 @@ impl Passage {
 pub const POLICY: Policy = Policy {
     is_one_of_many: true,
     is_left_by_moved_places: true,
-    is_sought_beside_usual_errors: false,
+    is_sought_with_nuisance: false,
     ..Policy::USUAL
 };
 

@@ -43,7 +43,7 @@ fn braking(sample: &ResolvedSample) -> f64 {
 /// Rails differ from run to run, so it is never certain.
 pub const POLICY: Policy = Policy {
     certainty: Certainty::Never,
-    is_sought_beside_usual_errors: false,
+    is_sought_with_nuisance: false,
     is_passing: true,
     ..Policy::USUAL
 };

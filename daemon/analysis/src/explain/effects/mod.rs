@@ -102,7 +102,7 @@ mod tests {
     #[test]
     fn a_kind_that_is_never_certain_is_not_sought_for_certainty() {
         for effect in LIBRARY.iter().filter(|it| it.policy.certainty == Certainty::Never) {
-            assert!(!effect.policy.is_sought_beside_usual_errors, "{:?}", effect.kind);
+            assert!(!effect.policy.is_sought_with_nuisance, "{:?}", effect.kind);
         }
     }
 }

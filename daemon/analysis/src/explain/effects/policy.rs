@@ -9,7 +9,7 @@ pub enum Certainty {
     /// With the usual errors in the model, and without them.
     Anywhere,
     /// Only with the usual errors in the model, which otherwise look like the kind.
-    BesideUsualErrors,
+    WithNuisance,
     /// Nowhere: only the acceptance score accepts it.
     Never,
 }
@@ -51,14 +51,14 @@ pub struct Policy {
     /// Kinds that take its place where they explain more than it beside the usual errors.
     pub gives_way_to: &'static [EffectKind],
     /// Kinds in the model beside which it is not certain.
-    pub uncertain_beside: &'static [EffectKind],
+    pub uncertain_with: &'static [EffectKind],
     /// Whether its form or place is one of many, even if no end of it was estimated: it must also take from the error.
     pub is_one_of_many: bool,
     /// Whether a wrong gradient or wheel leaves such a force where pieces of the line end, so that a place that was
     /// chosen is not certain beside these.
     pub is_left_by_moved_places: bool,
     /// Whether it is sought with the usual errors in the model: it acts on the train by one law at every place.
-    pub is_sought_beside_usual_errors: bool,
+    pub is_sought_with_nuisance: bool,
     /// The kind as a small error that every railway has; `None` if it is no such error.
     pub everyday: Option<Everyday>,
     /// Whether it makes something late; two such kinds look alike.
@@ -74,10 +74,10 @@ impl Policy {
     pub const USUAL: Policy = Policy {
         certainty: Certainty::Anywhere,
         gives_way_to: &[],
-        uncertain_beside: &[],
+        uncertain_with: &[],
         is_one_of_many: false,
         is_left_by_moved_places: false,
-        is_sought_beside_usual_errors: true,
+        is_sought_with_nuisance: true,
         everyday: None,
         is_late: false,
         is_passing: false,

@@ -24,7 +24,7 @@ pub fn propose(scan: &Scan) -> Proposal {
     let is_like_traction = scan.are_inertia_and_traction_alike();
     if is_like_traction && scan.fit.model.has(EffectKind::TractionGain) {
         return Err(
-            "beside a scale of the traction force only braking or a known gradient shows it".into(),
+            "with a scale of the traction force found, only braking or a known gradient would show it".into(),
         );
     }
     Ok(vec![Candidate::new(Gamma { declared, is_like_traction }, vec![declared])])

@@ -23,7 +23,7 @@ struct DelayAndLag;
 /// Late forces look like a late speed, so it is never certain.
 pub const POLICY: Policy = Policy {
     certainty: Certainty::Never,
-    is_sought_beside_usual_errors: false,
+    is_sought_with_nuisance: false,
     everyday: Some(Everyday { rank: 4, most: f64::INFINITY }),
     is_late: true,
     ..Policy::USUAL

@@ -13,7 +13,7 @@ struct Scale;
 
 /// Wheels wear: an error of the record that every train has.
 pub const POLICY: Policy = Policy {
-    is_sought_beside_usual_errors: false,
+    is_sought_with_nuisance: false,
     everyday: Some(Everyday { rank: 2, most: f64::INFINITY }),
     ..Policy::USUAL
 };

@@ -30,7 +30,7 @@ struct ByRun {
 /// Winds differ from run to run, so a wind is never certain; on ordinary days it is part of the model without a name.
 pub const POLICY: Policy = Policy {
     certainty: Certainty::Never,
-    is_sought_beside_usual_errors: false,
+    is_sought_with_nuisance: false,
     everyday: Some(Everyday { rank: 5, most: wind::EVERYDAY_MPS }),
     ..Policy::USUAL
 };

@@ -98,7 +98,7 @@ impl Settling {
 }
 
 /// Whether two beliefs are one.
-fn are_one(from: &Matrix2<f64>, now: &Matrix2<f64>) -> bool {
+fn is_converged(from: &Matrix2<f64>, now: &Matrix2<f64>) -> bool {
     let is_near = |one: f64, other: f64| (one - other).abs() <= SETTLED_SHARE * other.abs();
     from.iter().zip(now.iter()).all(|(from, now)| is_near(*from, *now))
 }
@@ -124,7 +124,11 @@ impl Walk {
         if let Some(last) = &self.last
             && !starts
             && last.is_of(step_s, bin_var)
-            && (if follows { last.is_settled } else { are_one(&last.from, &belief.covariance) })
+            && (if follows {
+                last.is_settled
+            } else {
+                is_converged(&last.from, &belief.covariance)
+            })
         {
             belief.covariance = last.to;
             return (last.step, last.variance);
@@ -151,7 +155,7 @@ impl Walk {
         step.gain = belief.take(LEVEL, &innovation, bin_var);
         step.per_deviation = innovation.inverse_variance.sqrt();
         let (to, variance) = (belief.covariance, innovation.variance);
-        let is_settled = are_one(&from, &to);
+        let is_settled = is_converged(&from, &to);
         self.last =
             Some(Settling { time_s: step_s, bin_var, from, to, step, variance, is_settled });
         (step, variance)
@@ -245,15 +249,15 @@ impl BinWhitener {
         loop {
             left = match left {
                 [a, b, c, d, left @ ..] => {
-                    self.whiten_beside([a, b, c, d]);
+                    self.whiten_together([a, b, c, d]);
                     left
                 }
                 [a, b, left @ ..] => {
-                    self.whiten_beside([a, b]);
+                    self.whiten_together([a, b]);
                     left
                 }
                 [a, left @ ..] => {
-                    self.whiten_beside([a]);
+                    self.whiten_together([a]);
                     left
                 }
                 [] => break,
@@ -262,7 +266,7 @@ impl BinWhitener {
     }
 
     /// The same of a few beside each other, which do not wait for each other.
-    fn whiten_beside<const N: usize>(&self, series: [&mut [f64]; N]) {
+    fn whiten_together<const N: usize>(&self, series: [&mut [f64]; N]) {
         let mut series = series.map(|it| &mut it[..self.steps.len()]);
         let mut tracked: [Tracked; N] = array::from_fn(|_| Tracked::default());
         for (k, step) in self.steps.iter().enumerate() {

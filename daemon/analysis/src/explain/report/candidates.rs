@@ -24,7 +24,7 @@ pub struct CandidateRow {
     /// over each run as predicted from the others.
     pub reduction: Option<f64>,
     /// Evidence jointly with everything found; `None` for a kind that was found or could not be tested.
-    pub beside: Option<f64>,
+    pub given_found: Option<f64>,
     /// Why it was accepted or not.
     pub reason: String,
 }
@@ -45,7 +45,7 @@ pub fn rows(explanation: &Explanation) -> Vec<CandidateRow> {
         .map(|trial| {
             let kind = trial.kind.name();
             let is_found = found.contains(&kind);
-            let beside = of(last, trial.kind).filter(|_| !is_found);
+            let given_found = of(last, trial.kind).filter(|_| !is_found);
             let reduction = reduction(&explanation.problem, &outcome.base, &trial.fit);
             let mut row = CandidateRow {
                 kind,
@@ -53,7 +53,7 @@ pub fn rows(explanation: &Explanation) -> Vec<CandidateRow> {
                 is_found,
                 alone: Some(trial.evidence),
                 reduction: Some(reduction),
-                beside,
+                given_found,
                 reason: String::new(),
             };
             row.reason = reason(explanation, &row, competing.contains(&kind));
@@ -69,7 +69,7 @@ pub fn rows(explanation: &Explanation) -> Vec<CandidateRow> {
         is_found: false,
         alone: None,
         reduction: None,
-        beside: None,
+        given_found: None,
         reason: format!("not testable: {why}"),
     }));
     rows
@@ -89,9 +89,9 @@ fn reason(explanation: &Explanation, row: &CandidateRow, is_rival: bool) -> Stri
     if is_rival {
         return format!("explains the runs as well as {found}: not distinguishable");
     }
-    match row.beside {
-        Some(beside) if alone > SCORE_MIN && beside <= SCORE_MIN => {
-            format!("borrows from the same residual: adds nothing beside {found}")
+    match row.given_found {
+        Some(given_found) if alone > SCORE_MIN && given_found <= SCORE_MIN => {
+            format!("borrows from the same residual: adds nothing given_found {found}")
         }
         _ => considered(),
     }

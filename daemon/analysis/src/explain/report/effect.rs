@@ -11,10 +11,10 @@ use dynocar_shared::vocabulary::{EffectKind, KindRow};
 
 use crate::explain::answer::{
     EffectAnswer, EffectMeaning, HeldOutAnswer, Location, MassWindow, ParameterValue,
-    PlaceUncertainty, RunWindow, Verdict, VerdictWords, in_plain_words,
+    PlaceUncertainty, RunWindow, Verdict, VerdictWords, WithStd, in_plain_words,
 };
 use crate::explain::over_time::CHANCE_MAX;
-use crate::explain::selection::{EffectTrial, SearchOutcome};
+use crate::explain::selection::{EffectTrial, ScaleSources, SearchOutcome};
 use crate::statistics::span;
 
 /// The named values of an effect.
@@ -129,6 +129,20 @@ fn in_order<W>(windows: &[W], key: fn(&W) -> (&String, f64)) -> std::vec::IntoIt
 
 /// The words for the probability of an effect.
 pub const CHANCE: &str = "chance of as much where nothing acts";
+
+/// Describes scales of the speeds that contradict each other.
+pub fn contradicting_scales(scales: &ScaleSources) -> String {
+    let percent = |it: WithStd| {
+        format!("{:+.2} ± {:.2} %", 100.0 * (it.value - 1.0), 100.0 * HALF_95 * it.std)
+    };
+    format!(
+        "Positions and motion contradict each other: by positions alone the speeds read {}, by \
+         gradients and forces alone {}. One of them is wrong by more than usual, and no part is to be \
+         replaced before it is known which.",
+        percent(scales.positions),
+        percent(scales.motion)
+    )
+}
 
 /// Returns how sure it is that an effect acts, by the probability of finding as much where nothing does.
 pub fn sureness(p_value: f64) -> String {
@@ -353,5 +367,13 @@ mod tests {
             described(&effect),
             "a dragging brake in runs/02.csv – drag force 3059 N (95 % interval 2848 to 3269)"
         );
+    }
+
+    #[test]
+    fn contradicting_scales_are_stated_in_percent_with_their_intervals() {
+        let [positions, motion] =
+            [(1.015, 0.001), (1.003, 0.002)].map(|(value, std)| WithStd { value, std });
+        let sentence = contradicting_scales(&ScaleSources { positions, motion });
+        assert!(sentence.contains("+1.50 ± 0.20 %") && sentence.contains("+0.30 ± 0.39 %"));
     }
 }

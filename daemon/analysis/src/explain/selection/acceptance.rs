@@ -72,10 +72,10 @@ pub fn deciding_score(
     fit: &Fit,
     index: usize,
     (evidence, reduction): (f64, f64),
-    is_certain_beside: bool,
+    is_certain_with_nuisance: bool,
 ) -> f64 {
     let score = acceptance_score(evidence, reduction);
-    let is_certain = is_certain_beside || is_certain(fit, index, evidence, reduction, false);
+    let is_certain = is_certain_with_nuisance || is_certain(fit, index, evidence, reduction, false);
     if is_certain { score.max(SCORE_MIN) } else { score }
 }
 
@@ -87,19 +87,19 @@ pub(super) fn is_certain(
     index: usize,
     evidence: f64,
     reduction: f64,
-    is_beside_usual_errors: bool,
+    has_nuisance: bool,
 ) -> bool {
     let effect = &fit.model.effects[index];
     let policy = policy_of(effect.kind());
     let is_by_run = effect.nature().is_one_number_a_run;
     let may_be_certain = match policy.certainty {
         Certainty::Anywhere => true,
-        Certainty::BesideUsualErrors => is_beside_usual_errors,
+        Certainty::WithNuisance => has_nuisance,
         Certainty::Never => false,
     };
-    let is_doubtful = policy.uncertain_beside.iter().any(|kind| fit.model.has(*kind));
+    let is_doubtful = policy.uncertain_with.iter().any(|kind| fit.model.has(*kind));
     // The usual errors include the map's.
-    let is_left = !is_beside_usual_errors
+    let is_left = !has_nuisance
         && is_left_by_moved_places(effect)
         && fit.model.effects.iter().any(moves_places);
     let needs_the_score = !may_be_certain || is_doubtful || is_left;

@@ -121,7 +121,7 @@ pub fn scatter_factor(fit: &Fit, parameter: usize) -> f64 {
 
 /// Returns the deviations of the first `count` parameters together with the last `shared`: errors that all runs
 /// share, of which the scatter between the runs shows nothing.
-pub fn deviations_beside(fit: &Fit, count: usize, shared: usize) -> Deviations {
+pub fn deviations_with_nuisance(fit: &Fit, count: usize, shared: usize) -> Deviations {
     let information = fit.free_information();
     let variance_of = |parameters: usize| {
         let factor = Cholesky::new(first(&information, parameters))?;
@@ -131,8 +131,8 @@ pub fn deviations_beside(fit: &Fit, count: usize, shared: usize) -> Deviations {
     let Deviations { mut std, covariance, c } = deviations_of_first(fit, held);
     std.truncate(count);
     let mut covariance = first(&covariance, count);
-    if let (Some(beside), Some(alone)) = (variance_of(fit.theta.len()), variance_of(held)) {
-        let added = beside - alone;
+    if let (Some(joint), Some(alone)) = (variance_of(fit.theta.len()), variance_of(held)) {
+        let added = joint - alone;
         for (i, std) in std.iter_mut().enumerate() {
             *std = std.hypot(added[(i, i)].max(0.0).sqrt());
         }

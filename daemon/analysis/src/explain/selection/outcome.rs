@@ -5,7 +5,7 @@ use std::sync::Arc;
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::by_run::deviations_beside;
+use super::by_run::deviations_with_nuisance;
 use super::refusal::Refusal;
 use crate::explain::effects::SharedHypothesis;
 use crate::explain::evidence::{Fit, acceptance_score};
@@ -61,14 +61,14 @@ pub(super) fn round_of(mut trials: Vec<EffectTrial>) -> SearchRound {
 
 /// A model fitted jointly with the usual errors.
 #[derive(Clone)]
-pub struct Beside {
+pub struct NuisanceFit {
     /// The fit: the usual errors are its last effects, and loads and winds of the runs are integrated out.
     pub fit: Fit,
     /// Number of the last parameters that all runs share.
     pub shared: usize,
 }
 
-impl Beside {
+impl NuisanceFit {
     /// Returns whether it belongs to a fitted model with the parameters `from`.
     pub(super) fn is_of(&self, fit: &Fit, from: &[f64]) -> bool {
         let mut effects = fit.model.effects.iter().zip(&self.fit.model.effects);
@@ -79,7 +79,7 @@ impl Beside {
     pub(super) fn holds_none(&self, index: usize) -> bool {
         let range = self.fit.model.ranges()[index].clone();
         let size = self.fit.model.effects[index].size(&self.fit.theta[range.clone()]);
-        let std = deviations_beside(&self.fit, range.end, self.shared).std[range.start];
+        let std = deviations_with_nuisance(&self.fit, range.end, self.shared).std[range.start];
         size.abs() < HALF_95 * std
     }
 
@@ -92,7 +92,7 @@ impl Beside {
             return false;
         }
         let range = fit.model.ranges()[index].clone();
-        let std = deviations_beside(fit, range.end, self.shared).std;
+        let std = deviations_with_nuisance(fit, range.end, self.shared).std;
         let away =
             range.map(|i| (fit.theta[i] - effect.none()) / std[i].hypot(fit.noise.scatter.force));
         rms(&away.collect::<Vec<_>>()) < (2.0 * (fit.runs.len() as f64).ln()).sqrt()
@@ -124,7 +124,7 @@ pub struct SearchOutcome {
     /// Kinds at chosen places that were tried as one number of the whole train or line.
     pub(super) returned: Vec<EffectKind>,
     /// Parameters of the model that was last fitted jointly with the usual errors, and that joint fit.
-    pub(super) beside: Option<(Vec<f64>, Arc<Beside>)>,
+    pub(super) nuisance_fit: Option<(Vec<f64>, Arc<NuisanceFit>)>,
 }
 
 impl SearchOutcome {
@@ -139,13 +139,13 @@ impl SearchOutcome {
     }
 
     /// The finished model with the usual errors beside it, where it was fitted so.
-    pub fn beside(&self) -> Option<Arc<Beside>> {
-        self.beside.as_ref().map(|(_, beside)| beside.clone())
+    pub fn nuisance_fit(&self) -> Option<Arc<NuisanceFit>> {
+        self.nuisance_fit.as_ref().map(|(_, joint)| joint.clone())
     }
 
     /// Puts another fit with the usual errors in the place of that.
-    pub fn set_beside(&mut self, beside: Beside) {
-        self.beside = Some((self.likeliest.theta.clone(), beside.into()));
+    pub fn set_nuisance_fit(&mut self, joint: NuisanceFit) {
+        self.nuisance_fit = Some((self.likeliest.theta.clone(), joint.into()));
     }
 
     /// Whether nothing more is looked for.

@@ -55,9 +55,9 @@ impl Search<'_> {
         let asked = Asked { is_asked: &is_asked, rivals_of: None };
         let trials = self.round_of(&rest, &mut Vec::new(), asked);
         let Some(best) = self.best(&trials, &outcome.fallen_kinds()) else { return false };
-        let own = Self::total(&self.beside_usual_errors(outcome).fit);
+        let own = Self::total(&self.refit_with_nuisance(outcome).fit);
         let mut other = SearchOutcome { fit: best.fit.clone(), ..outcome.clone() };
-        if Self::total(&self.beside_usual_errors(&mut other).fit) > own - EQUAL {
+        if Self::total(&self.refit_with_nuisance(&mut other).fit) > own - EQUAL {
             return false;
         }
         other.fallen.push((kind, Refusal::GivesWay(best.kind)));
@@ -83,9 +83,9 @@ impl Search<'_> {
         });
         let Some((kind, fit)) = whole else { return false };
         outcome.returned.push(kind);
-        let own = Self::total(&self.beside_usual_errors(outcome).fit);
+        let own = Self::total(&self.refit_with_nuisance(outcome).fit);
         let mut other = SearchOutcome { fit, ..outcome.clone() };
-        let is_better = Self::total(&self.beside_usual_errors(&mut other).fit) < own;
+        let is_better = Self::total(&self.refit_with_nuisance(&mut other).fit) < own;
         if is_better {
             *outcome = other;
         }

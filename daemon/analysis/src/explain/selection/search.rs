@@ -83,7 +83,7 @@ impl Search<'_> {
             certain: Vec::new(),
             fallen: Vec::new(),
             returned: Vec::new(),
-            beside: None,
+            nuisance_fit: None,
         }
     }
 
@@ -93,30 +93,30 @@ impl Search<'_> {
         if outcome.base.observations() < OBSERVATIONS_MIN {
             return outcome;
         }
-        self.take_what_scores(&mut outcome);
+        self.add_scored_effects(&mut outcome);
         loop {
-            while self.take_certain_beside(&mut outcome)
+            while self.add_certain_effects(&mut outcome)
                 || self.drop_fallen(&mut outcome)
                 || self.give_way(&mut outcome)
                 || self.return_to_whole(&mut outcome)
             {
-                self.take_what_scores(&mut outcome);
+                self.add_scored_effects(&mut outcome);
             }
             // Certain and small effects have joined since; an effect that they leave too little to take may be
             // certain itself.
             let before = outcome.kinds();
             self.prune(&mut outcome);
-            if outcome.kinds() == before || !self.take_certain_beside(&mut outcome) {
+            if outcome.kinds() == before || !self.add_certain_effects(&mut outcome) {
                 break;
             }
         }
-        self.name_or_forget_small(&mut outcome);
+        self.finalise_minor_effects(&mut outcome);
         outcome
     }
 
     /// Accepts effects that remove much of the error for their evidence, and effects that are certain alone, until none
     /// is left.
-    fn take_what_scores(&self, outcome: &mut SearchOutcome) {
+    fn add_scored_effects(&self, outcome: &mut SearchOutcome) {
         let most = outcome.rounds.len() + ROUNDS_MAX;
         // Kinds that others replaced at once are not tried again either.
         let mut fruitless = outcome.fallen_kinds();

@@ -49,11 +49,11 @@ impl Search<'_> {
             };
             let grown = self.problem.grown(fit, [alone.last_parts()]);
             let grown = self.problem.with_own_noise(&grown);
-            let beside =
+            let joint =
                 EffectTrial { reduction: alone.reduction, ..Self::trial(fit, grown, alone.kind) };
-            if is_certain_and_small(&beside) {
-                kinds.push(beside.kind);
-                *fit = beside.fit;
+            if is_certain_and_small(&joint) {
+                kinds.push(joint.kind);
+                *fit = joint.fit;
             }
         }
         taken
@@ -61,7 +61,7 @@ impl Search<'_> {
 
     /// Names effects that have turned out to matter jointly with those found. Removes small effects where nothing was
     /// found, and those that are no longer certain jointly with the effects found.
-    pub(super) fn name_or_forget_small(&self, outcome: &mut SearchOutcome) {
+    pub(super) fn finalise_minor_effects(&self, outcome: &mut SearchOutcome) {
         let kinds = outcome.kinds();
         outcome.small.retain(|small| kinds.contains(small));
         let usual = self.usual_scales(outcome);
@@ -99,9 +99,9 @@ impl Search<'_> {
         if !outcome.fit.model.effects.iter().any(is_scale) {
             return Vec::new();
         }
-        let beside = self.beside_usual_errors(outcome);
+        let joint = self.refit_with_nuisance(outcome);
         let scales = outcome.fit.model.effects.iter().enumerate();
-        let usual = scales.filter(|(index, effect)| is_scale(effect) && beside.holds_none(*index));
+        let usual = scales.filter(|(index, effect)| is_scale(effect) && joint.holds_none(*index));
         usual.map(|(_, effect)| effect.kind()).collect()
     }
 }

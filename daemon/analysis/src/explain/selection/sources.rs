@@ -20,7 +20,7 @@ impl ScaleSources {
     /// Returns the scales of a finished model with a wrong wheel; `None` without one, or where one of the two sources
     /// determines nothing.
     pub fn of(problem: &FitProblem, outcome: &SearchOutcome) -> Option<Self> {
-        let fit = &outcome.beside.as_ref()?.1.fit;
+        let fit = &outcome.nuisance_fit.as_ref()?.1.fit;
         let scales = |number: &usize| fit.model.effects[*number].nature().changes_speed_scale;
         let wheel = (0..outcome.fit.model.effects.len()).find(scales)?;
         let i = fit.model.ranges()[wheel].start;
@@ -37,20 +37,6 @@ impl ScaleSources {
     pub fn are_apart(&self) -> bool {
         let allowed = HALF_95 * (self.positions.std + self.motion.std);
         (self.positions.value - self.motion.value).abs() > allowed
-    }
-
-    /// Both in a sentence.
-    pub fn sentence(&self) -> String {
-        let percent = |it: WithStd| {
-            format!("{:+.2} ± {:.2} %", 100.0 * (it.value - 1.0), 100.0 * HALF_95 * it.std)
-        };
-        format!(
-            "Positions and motion contradict each other: by positions alone the speeds read {}, by \
-             gradients and forces alone {}. One of them is wrong by more than usual, and no part is to be \
-             replaced before it is known which.",
-            percent(self.positions),
-            percent(self.motion)
-        )
     }
 }
 
@@ -77,10 +63,6 @@ mod tests {
         assert!((motion.value - 1.003).abs() < 1e-9 && (motion.std - 0.002).abs() < 1e-9);
         let apart = ScaleSources { positions, motion };
         assert!(apart.are_apart());
-        assert!(
-            apart.sentence().contains("+1.50 ± 0.20 %")
-                && apart.sentence().contains("+0.30 ± 0.39 %")
-        );
         let near = WithStd { value: 1.012, ..motion };
         assert!(!ScaleSources { positions, motion: near }.are_apart());
         assert_eq!(without(positions, positions), None);

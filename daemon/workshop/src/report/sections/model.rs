@@ -113,7 +113,7 @@ fn sentence(place: &PlaceRuns) -> String {
 /// Returns the section.
 pub fn candidates(subject: &Subject) -> PageSection {
     let rows = &subject.data.candidates;
-    let has_beside = rows.iter().any(|row| row.beside.is_some());
+    let has_given_found = rows.iter().any(|row| row.given_found.is_some());
     let evidence =
         |value: Option<f64>| value.map_or("–".into(), |value| minus(&format!("{value:.0}")));
     let reduction = |share: f64| minus(&format!("{:.0} %", 100.0 * share));
@@ -121,10 +121,10 @@ pub fn candidates(subject: &Subject) -> PageSection {
         ("Candidate", Words, &|it| format!("{} <code>{}</code>", escape(it.title), it.kind)),
         ("Evidence alone", Numbers, &|it| evidence(it.alone)),
         ("Error taken away alone", Numbers, &|it| it.reduction.map_or("–".into(), reduction)),
-        ("Evidence given what was found", Numbers, &|it| evidence(it.beside)),
+        ("Evidence given what was found", Numbers, &|it| evidence(it.given_found)),
         ("Outcome", Words, &|it| escape(&it.reason)),
     ];
-    let is_kept = |it: &TableColumn<_>| has_beside || !it.0.starts_with("Evidence given");
+    let is_kept = |it: &TableColumn<_>| has_given_found || !it.0.starts_with("Evidence given");
     let kept: Vec<_> = columns.into_iter().filter(is_kept).collect();
     let mut body = format!(
         "<p>Every kind of the library was fitted together with a, b and c. Evidence is the \

@@ -35,8 +35,8 @@ struct Dragging {
 /// Its runs are chosen among many, which the usual errors of single runs stand for; beside slippery rails a
 /// slide looks like a brake that drags.
 pub const POLICY: Policy = Policy {
-    certainty: Certainty::BesideUsualErrors,
-    uncertain_beside: &[EffectKind::LowAdhesion],
+    certainty: Certainty::WithNuisance,
+    uncertain_with: &[EffectKind::LowAdhesion],
     is_one_of_many: true,
     is_passing: true,
     ..Policy::USUAL

@@ -22,7 +22,7 @@ const PARTS_MAX: usize = 5;
 
 /// Loads differ from run to run, so that a change of mass is never certain.
 pub const POLICY: Policy =
-    Policy { certainty: Certainty::Never, is_sought_beside_usual_errors: false, ..Policy::USUAL };
+    Policy { certainty: Certainty::Never, is_sought_with_nuisance: false, ..Policy::USUAL };
 
 /// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {

@@ -22,7 +22,7 @@ const FORMS_MAX: usize = 4;
 
 /// Its form is chosen among many, and some form may explain the usual errors.
 pub const POLICY: Policy =
-    Policy { certainty: Certainty::BesideUsualErrors, is_one_of_many: true, ..Policy::USUAL };
+    Policy { certainty: Certainty::WithNuisance, is_one_of_many: true, ..Policy::USUAL };
 
 /// Returns whether a range of a covariate contains a force that would be accepted: any force with a form shows there
 /// too.

@@ -195,7 +195,7 @@ impl Fit {
     }
 
     /// Whether loads and winds of each run stand beside it.
-    pub fn is_beside_loads_and_winds(&self) -> bool {
+    pub fn has_loads_and_winds(&self) -> bool {
         self.noise.scatter_most == RunScatter::MOST_BESIDE
     }
 

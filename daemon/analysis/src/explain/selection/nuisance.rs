@@ -12,8 +12,8 @@ use dynocar_shared::vocabulary::EffectKind;
 use super::acceptance::{
     CERTAIN_RUNS_MIN, is_certain, is_left_by_moved_places, is_material, is_possible, moves_places,
 };
-use super::by_run::{Deviations, deviations, deviations_beside};
-use super::outcome::{Beside, EffectTrial, SearchOutcome, round_of};
+use super::by_run::{Deviations, deviations, deviations_with_nuisance};
+use super::outcome::{EffectTrial, NuisanceFit, SearchOutcome, round_of};
 use super::price::{at_bound, penalty};
 use super::refusal::Refusal;
 use super::search::Search;
@@ -27,7 +27,7 @@ use crate::explain::places::SURVEYED;
 use crate::explain::places::span_m;
 
 /// Returns whether some evidence makes the last effect of a trial certain jointly with the usual errors.
-pub fn is_certain_beside(trial: &EffectTrial, evidence: f64) -> bool {
+pub fn is_certain_with_nuisance(trial: &EffectTrial, evidence: f64) -> bool {
     is_material(trial)
         && is_possible(trial)
         && is_certain(&trial.fit, trial.last(), evidence, trial.reduction, true)
@@ -51,12 +51,12 @@ const ROUNDING_SHARE: f64 = 0.1;
 
 impl Search<'_> {
     /// Fits the model of the search jointly with the usual errors; a finished fit of the same model is returned again.
-    pub fn beside_usual_errors(&self, outcome: &mut SearchOutcome) -> Arc<Beside> {
+    pub fn refit_with_nuisance(&self, outcome: &mut SearchOutcome) -> Arc<NuisanceFit> {
         let fit = &outcome.fit;
-        if let Some((from, beside)) = &outcome.beside
-            && beside.is_of(fit, from)
+        if let Some((from, joint)) = &outcome.nuisance_fit
+            && joint.is_of(fit, from)
         {
-            return beside.clone();
+            return joint.clone();
         }
         let freed: Vec<_> = freed_figures(fit).collect();
         let is_felt = self.problem.runs.iter().any(|run| run.is_gradient_felt);
@@ -73,9 +73,9 @@ impl Search<'_> {
         if let Some(rounded) = rounded {
             self.round_as_found(&mut fit, rounded);
         }
-        let beside = Arc::new(Beside { fit, shared });
-        outcome.beside = Some((outcome.fit.theta.clone(), beside.clone()));
-        beside
+        let joint = Arc::new(NuisanceFit { fit, shared });
+        outcome.nuisance_fit = Some((outcome.fit.theta.clone(), joint.clone()));
+        joint
     }
 
     /// The errors of the map and how it rounds its steps, also beside a greater error that the runs show of it; none
@@ -98,7 +98,7 @@ impl Search<'_> {
         for _ in 0..ROUNDING_TURNS {
             let at = fit.model.ranges()[number].start;
             let share = fit.theta[at];
-            let std = deviations_beside(fit, fit.theta.len(), 0).std[at];
+            let std = deviations_with_nuisance(fit, fit.theta.len(), 0).std[at];
             let is_shown = std.is_finite() && share > HALF_95 * std;
             if !is_shown || (share - 1.0).abs() < ROUNDING_SHARE {
                 return;
@@ -116,31 +116,30 @@ impl Search<'_> {
     ///
     /// The search keeps the map's error in the shape fitted without the effect. A candidate that may be certain is
     /// judged with every number of the map's error free: then the map explains less of the effect.
-    pub(super) fn take_certain_beside(&self, outcome: &mut SearchOutcome) -> bool {
-        let beside = &self.beside_usual_errors(outcome).fit;
+    pub(super) fn add_certain_effects(&self, outcome: &mut SearchOutcome) -> bool {
+        let joint = &self.refit_with_nuisance(outcome).fit;
         if outcome.is_full() || self.problem.runs.len() < CERTAIN_RUNS_MIN {
             return false;
         }
-        let looked = self.with_map_as_fitted(&outcome.fit, beside);
+        let looked = self.with_map_as_fitted(&outcome.fit, joint);
         let fallen = outcome.fallen_kinds();
-        let is_sought = |kind: EffectKind| {
-            policy_of(kind).is_sought_beside_usual_errors && !fallen.contains(&kind)
-        };
+        let is_sought =
+            |kind: EffectKind| policy_of(kind).is_sought_with_nuisance && !fallen.contains(&kind);
         let tried = self.round_of(
             &looked,
             &mut Vec::new(),
             Asked { is_asked: &is_sought, rivals_of: None },
         );
         let may_be =
-            |trial: &&EffectTrial| is_certain_beside(trial, PROMISE_TIMES * trial.bic_gain);
+            |trial: &&EffectTrial| is_certain_with_nuisance(trial, PROMISE_TIMES * trial.bic_gain);
         let are_places_moved = outcome.fit.model.effects.iter().any(moves_places);
         let is_left = |trial: &EffectTrial| {
             are_places_moved && is_left_by_moved_places(&trial.fit.model.effects[trial.last()])
         };
         let may_stand = |trial: &&EffectTrial| may_be(trial) && !is_left(trial);
         let may_be_certain = tried.iter().filter(may_stand);
-        let judged = may_be_certain.map(|trial| self.with_map_free(beside, trial));
-        let certain = judged.filter(|trial| is_certain_beside(trial, trial.evidence));
+        let judged = may_be_certain.map(|trial| self.with_map_free(joint, trial));
+        let certain = judged.filter(|trial| is_certain_with_nuisance(trial, trial.evidence));
         let best = certain.max_by(|one, other| one.evidence.total_cmp(&other.evidence));
         let Some(found) = best else { return false };
         let grown = self.problem.grown(&outcome.fit, [found.last_parts()]);
@@ -150,10 +149,10 @@ impl Search<'_> {
     }
 
     /// The model beside the usual errors with the map's error in the shape that was fitted.
-    fn with_map_as_fitted(&self, fit: &Fit, beside: &Fit) -> Fit {
-        let (effects, ranges) = (&beside.model.effects, beside.model.ranges());
+    fn with_map_as_fitted(&self, fit: &Fit, joint: &Fit) -> Fit {
+        let (effects, ranges) = (&joint.model.effects, joint.model.ranges());
         let usual = (fit.model.effects.len()..effects.len()).map(|number| {
-            let (own, values) = (effects[number].clone(), &beside.theta[ranges[number].clone()]);
+            let (own, values) = (effects[number].clone(), &joint.theta[ranges[number].clone()]);
             // A single number keeps its prior: at none it has no shape, and would be determined by nothing.
             if own.is_gradient() && values.len() > 1 {
                 map_error_as_fitted(own, values).parts()
@@ -161,17 +160,17 @@ impl Search<'_> {
                 (own, values.to_vec())
             }
         });
-        self.problem.grown(&self.problem.again(fit, beside.noise), usual)
+        self.problem.grown(&self.problem.again(fit, joint.noise), usual)
     }
 
     /// Returns a trial with every number of the map's error free. Its evidence is the smaller of that under the noise
     /// with the effect and that under the noise without it. The part of the map's error that all runs share is in the
     /// model.
-    fn with_map_free(&self, beside: &Fit, trial: &EffectTrial) -> EffectTrial {
-        let grown = self.problem.grown(beside, [trial.last_parts()]);
-        let free = Self::trial(beside, self.problem.with_own_noise(&grown), trial.kind);
+    fn with_map_free(&self, joint: &Fit, trial: &EffectTrial) -> EffectTrial {
+        let grown = self.problem.grown(joint, [trial.last_parts()]);
+        let free = Self::trial(joint, self.problem.with_own_noise(&grown), trial.kind);
         let (with, last) = (&free.fit, free.last());
-        let alike = self.problem.again(beside, with.noise).cost - with.cost - penalty(with, last);
+        let alike = self.problem.again(joint, with.noise).cost - with.cost - penalty(with, last);
         let has_map_error = with.model.effects.iter().any(|effect| effect.is_gradient());
         let own = if has_map_error { free.bic_gain } else { free.evidence };
         EffectTrial { evidence: own.min(alike), reduction: trial.reduction, ..free }
@@ -181,8 +180,8 @@ impl Search<'_> {
     /// more than chance there, an effect of the library that runs to a bound of its range there, and an effect that was
     /// certain until others were accepted. Returns false without one.
     pub(super) fn drop_fallen(&self, outcome: &mut SearchOutcome) -> bool {
-        let joint = self.beside_usual_errors(outcome);
-        let beside = &joint.fit;
+        let joint = self.refit_with_nuisance(outcome);
+        let with_usual = &joint.fit;
         let effects = &outcome.fit.model.effects;
         let refusal = |index: usize| {
             let kind = effects[index].kind();
@@ -190,8 +189,8 @@ impl Search<'_> {
                 return None;
             }
             let is_form = kind == EffectKind::Unknown && !outcome.is_certain(kind);
-            let decrease = || self.without(beside, index).cost - beside.cost;
-            if is_form && decrease() <= penalty(beside, index) {
+            let decrease = || self.without(with_usual, index).cost - with_usual.cost;
+            if is_form && decrease() <= penalty(with_usual, index) {
                 return Some((index, Refusal::Chance));
             }
             if outcome.is_certain(kind) && joint.holds_none(index) {
@@ -202,7 +201,7 @@ impl Search<'_> {
             }
             // A form may be greatest where its covariate's range ends.
             let may_fall = kind != EffectKind::Unknown && at_bound(&outcome.fit, index).is_none();
-            let bound = at_bound(beside, index).filter(|_| may_fall);
+            let bound = at_bound(with_usual, index).filter(|_| may_fall);
             Some((index, Refusal::AtBound(bound?)))
         };
         let Some((index, refusal)) = (0..effects.len()).find_map(refusal) else { return false };
@@ -214,8 +213,8 @@ impl Search<'_> {
 
 /// Moves the effects that were found to where they fit best with the usual errors in the model, and a, b and c to
 /// where they fit best with the effects alone: the prediction of runs knows no usual errors.
-pub fn move_beside_usual_errors(search: &Search, outcome: &mut SearchOutcome) {
-    let joint = search.beside_usual_errors(outcome);
+pub fn move_to_nuisance_fit(search: &Search, outcome: &mut SearchOutcome) {
+    let joint = search.refit_with_nuisance(outcome);
     outcome.likeliest = outcome.fit.clone();
     let fit = &outcome.likeliest;
     let count = fit.theta.len();
@@ -229,8 +228,8 @@ pub fn move_beside_usual_errors(search: &Search, outcome: &mut SearchOutcome) {
 /// apart.
 pub fn deviations_given(outcome: &SearchOutcome, step_s: f64) -> Deviations {
     let count = outcome.fit.theta.len();
-    let Some((_, joint)) = &outcome.beside else { return deviations(&outcome.fit) };
-    let mut deviations = deviations_beside(&joint.fit, count, joint.shared);
+    let Some((_, joint)) = &outcome.nuisance_fit else { return deviations(&outcome.fit) };
+    let mut deviations = deviations_with_nuisance(&joint.fit, count, joint.shared);
     let model = &outcome.fit.model;
     for (effect, range) in model.effects.iter().zip(model.ranges()) {
         for std in &mut deviations.std[range.clone()] {
