@@ -66,7 +66,7 @@ enum Command {
     Models(models::ModelsArguments),
     /// Record the samples and snapshots of controller and daemon, as MCAP
     Record(Passed),
-    /// Keep the last hours on disk, and for good the minutes around a suspicion or a fault
+    /// Keep the last hours on disk, and for good the minutes around a suspicion or fault
     FlightRecorder(Passed),
     /// Ask a flight recorder to keep this moment for good
     Keep(Passed),
