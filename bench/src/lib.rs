@@ -17,6 +17,14 @@
 //! - `parallel`: the same work over many cases, on some threads
 //! - `statistics`: means and quantiles over seeded runs
 //! - `chance`: random numbers
+//!
+//! # Examples
+//!
+//! ```
+//! // The command line, as the program parses it.
+//! let command = dynocar_bench::cli::command();
+//! assert!(command.try_get_matches_from(["program", "--no-such-option"]).is_err());
+//! ```
 
 mod brakes;
 mod chance;

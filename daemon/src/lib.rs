@@ -24,6 +24,13 @@
 //! - [`supervision`]: health and metrics of the daemon, for supervisors and operators
 //! - [`text_file`]: text files from disk
 //! - [`replay`]: recorded runs into the sample channel
+//!
+//! # Examples
+//!
+//! ```
+//! let commands = dynocar::cli::commands();
+//! assert!(commands.find_subcommand("explain").is_some());
+//! ```
 
 pub mod cli;
 pub mod config;

@@ -13,6 +13,28 @@
 //! - [`pipeline`]: estimators behind one interface, from sample to snapshot
 //! - [`trial`]: which of several models predicts better, judged while a train runs
 //! - [`remedy`]: remedies for a reason or a refused sample
+//!
+//! # Examples
+//!
+//! ```
+//! use std::sync::Arc;
+//!
+//! use dynocar_core::pipeline::train_kalman::{TrainKalman, TrainKalmanSettings};
+//! use dynocar_core::pipeline::Pipeline;
+//! use dynocar_model::train::{Davis, TrainModel};
+//! use dynocar_shared::{SampleField, Status, TrainId, TrainSample};
+//!
+//! let resistance = Davis { a: 1.5, b: 0.01, c: 0.0005 };
+//! let train = Arc::new(TrainModel::bare("metro", 200_000.0, resistance));
+//! let estimator = TrainKalman::new(TrainKalmanSettings::default(), &train)?;
+//! let mut pipeline = Pipeline::new(TrainId(1), 0, train, None, Box::new(estimator));
+//!
+//! let sample = TrainSample::empty(TrainId(1)).with(SampleField::Speed, 21.5);
+//! let snapshot = pipeline.process(&sample);
+//! // One sample shows nothing yet.
+//! assert_eq!(snapshot.status, Status::Unestimated as u32);
+//! # Ok::<(), dynocar_core::pipeline::SettingError>(())
+//! ```
 
 pub mod filter;
 pub mod pipeline;

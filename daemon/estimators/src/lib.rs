@@ -14,6 +14,23 @@
 //! - [`xie`] (Xie 2019, and Jin 2020 for the brake): expectation maximisation over a sliding window
 //!
 //! As the core, this library knows no channel, clock, file, thread or logger.
+//!
+//! # Examples
+//!
+//! ```
+//! use std::sync::Arc;
+//!
+//! use dynocar_estimators::EstimatorSettings;
+//! use dynocar_model::train::{Davis, TrainModel};
+//! use dynocar_shared::PipelineKind;
+//!
+//! let resistance = Davis { a: 1.5, b: 0.01, c: 0.0005 };
+//! let train = Arc::new(TrainModel::bare("metro", 200_000.0, resistance));
+//! let settings = EstimatorSettings::default_of(PipelineKind::MassKalman).expect("a kind that exists");
+//! let estimator = settings.build(&train)?;
+//! assert_eq!(estimator.kind(), PipelineKind::MassKalman);
+//! # Ok::<(), dynocar_core::pipeline::SettingError>(())
+//! ```
 
 pub mod liu;
 pub mod resistance;

@@ -15,6 +15,13 @@
 //! - [`inputs`]: inputs during a step
 //! - [`model`]: the model behind an instance: inputs, one of the models, the order of calls
 //! - [`ffi`]: the functions that a simulator calls
+//!
+//! # Examples
+//!
+//! ```
+//! let described = dynocar_fmu::model_description(&dynocar_fmu::PLANT, dynocar_fmu::STEP_DEFAULT_S);
+//! assert!(described.contains("fmiVersion=\"2.0\""));
+//! ```
 
 pub mod description;
 pub mod error;

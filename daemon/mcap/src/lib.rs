@@ -17,6 +17,19 @@
 //! - [`copying`]: copies of recordings, ours or not; repair of a truncated file
 //! - [`annotate`]: an explanation next to the data
 //! - [`error`]: errors of files, with their paths
+//!
+//! # Examples
+//!
+//! ```
+//! use dynocar_mcap::codec::{decode_sample, encode_sample};
+//! use dynocar_shared::{SampleField, TrainId, TrainSample};
+//!
+//! let sample = TrainSample::empty(TrainId(1)).with(SampleField::Speed, 21.5);
+//! let mut message = Vec::new();
+//! encode_sample(&sample, &mut message);
+//! assert_eq!(decode_sample(&message)?.get(SampleField::Speed), Some(21.5));
+//! # Ok::<(), dynocar_mcap::codec::CodecError>(())
+//! ```
 
 pub mod annotate;
 pub mod codec;

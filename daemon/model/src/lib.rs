@@ -13,6 +13,17 @@
 //! - [`simulate`]: the speed that a force model predicts over a recorded run
 //! - [`words`]: the words of every answer: kinds of effects, their numbers and places
 //! - [`named!`]: enums whose members have names in files
+//!
+//! # Examples
+//!
+//! ```
+//! use dynocar_model::train::{Davis, TrainModel};
+//!
+//! let resistance = Davis { a: 1.5, b: 0.01, c: 0.0005 };
+//! let train = TrainModel::bare("metro", 200_000.0, resistance);
+//! // 1.5 + 0.01 · 20 + 0.0005 · 20² N/kN at 20 m/s
+//! assert!((train.resistance.w0_n_per_kn(20.0) - 1.9).abs() < 1e-12);
+//! ```
 
 pub mod force;
 mod named;

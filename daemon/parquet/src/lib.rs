@@ -13,6 +13,26 @@
 //! - [`columns`]: a Parquet file of any program as columns of numbers, and the train of each row
 //! - [`reading`]: Parquet to the messages of a recording, and to MCAP
 //! - [`table_file`], [`writing`]: MCAP to Parquet
+//!
+//! # Examples
+//!
+//! ```
+//! use dynocar_mcap::topic::Message;
+//! use dynocar_mcap::writing::{RecordingWriter, WallClock};
+//! use dynocar_shared::{SampleField, TrainId, TrainSample};
+//!
+//! let folder = tempfile::tempdir()?;
+//! let (mcap, tables) = (folder.path().join("run.mcap"), folder.path().join("run"));
+//! let mut recording = RecordingWriter::new(std::fs::File::create(&mcap)?, WallClock::now())?;
+//! let sample = TrainSample::empty(TrainId(1)).with(SampleField::Speed, 21.5);
+//! recording.write(Message::Sample(&sample))?;
+//! recording.finish()?;
+//!
+//! assert_eq!(dynocar_parquet::writing::write_folder(&[mcap], &tables)?.samples, 1);
+//! let read = dynocar_parquet::reading::read(&tables)?.into_recording();
+//! assert_eq!(read.samples[0].get(SampleField::Speed), Some(21.5));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod arrow_schema;
 pub mod column_type;

@@ -12,6 +12,14 @@
 //! - [`screen`]: the screen, drawn from a [`state`]
 //! - [`plain`]: lines where there is no terminal
 //! - [`terminal`]: keys, signals, and a terminal left as it was
+//!
+//! # Examples
+//!
+//! ```
+//! // The command line, as the program parses it.
+//! let command = dynocar_watch::cli::command();
+//! assert!(command.try_get_matches_from(["program", "--no-such-option"]).is_err());
+//! ```
 
 pub mod advisor;
 pub mod cli;

@@ -16,6 +16,15 @@
 //! - [`run_facts`]: facts and notes on a recorded run
 //! - [`survey`]: raw recordings to a dataset on a surveyed line
 //! - [`verify`]: every recorded snapshot computed again
+//!
+//! # Examples
+//!
+//! ```
+//! use dynocar_workshop::cli::execute;
+//!
+//! // Every command of the program can be called from Rust as well.
+//! assert!(execute(["check", "no-such-folder"]).is_err());
+//! ```
 
 pub mod brakes_page;
 pub mod cli;
