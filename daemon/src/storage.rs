@@ -179,7 +179,7 @@ impl StorageError {
     }
 }
 
-/// Replaces a file as a whole, by way of a file `beside` it in the same directory.
+/// Replaces a file as a whole, through a temporary file in the same directory.
 ///
 /// # Errors
 ///
@@ -200,8 +200,8 @@ pub fn replace(
     storage.sync_directory(directory).map_err(failed(directory, TO_THE_DISK))
 }
 
-/// Writes a file that is never replaced, by way of a file `beside` it, in a folder that is made when
-/// it is not there.
+/// Writes a file that is never replaced, through a temporary file in the same folder, which is made if it is not
+/// there.
 ///
 /// # Errors
 ///
@@ -222,7 +222,7 @@ pub fn write_once(
     storage.sync_directory(folder).map_err(failed(folder, TO_THE_DISK))
 }
 
-/// Makes a folder with files that are never replaced, by way of a folder `beside` it.
+/// Makes a folder with files that are never replaced, through a temporary folder next to it.
 ///
 /// # Errors
 ///
@@ -257,7 +257,7 @@ pub fn settle(storage: &(impl Storage + ?Sized), path: &Path) -> io::Result<()> 
     }
 }
 
-/// Returns a name beside another that no other writer uses, of this process or any that lives.
+/// Returns a path next to another that no other writer uses, of this process or of any that runs.
 pub fn part_of(path: &Path) -> PathBuf {
     static COUNT: AtomicU64 = AtomicU64::new(0);
     let name = path.file_name().unwrap_or_default().to_string_lossy();

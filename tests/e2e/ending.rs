@@ -40,7 +40,7 @@ const ENDS: [End; 6] = [
     End::ClosedPipes(Signal::TERM),
 ];
 
-/// A program at work on a site of its own, beside a controller.
+/// A program at work on a site of its own, together with a controller.
 struct TestSite {
     site: DaemonSite,
     controller: Process,

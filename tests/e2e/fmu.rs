@@ -147,7 +147,7 @@ fn every_output_has_the_bits_of_the_pipelines_at_every_moment_looked_at() {
     assert_eq!((status("resistance.status"), status("mass.status")), (2, 2), "both are estimated");
 }
 
-/// Unpacks an FMU beside it, as a simulator does.
+/// Unpacks an FMU into a folder next to it, as a simulator does.
 fn unpacked(site: &DaemonSite, fmu: &str) -> PathBuf {
     let folder = site.path().join("unpacked #1");
     let file = std::fs::File::open(site.path().join(fmu)).unwrap();

@@ -1,4 +1,4 @@
-//! The same samples give the same bits: twice, at any rate, beside any other pipelines, and as in the golden file.
+//! The same samples give the same bits: twice, at any rate, next to any other pipelines, and as in the golden file.
 
 use std::path::Path;
 use std::time::Duration;

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use crate::report::{OF_A_TUNNEL, open, page_of};
 
 /// Brings a plot into the window; returns its box, the numbers below its axis with their places, and the visible text
-/// beside it. `FIGURE` is replaced by a selector.
+/// next to it. `FIGURE` is replaced by a selector.
 const LOOK: &str = r#"(() => {
     const figure = document.querySelector("FIGURE");
     const svg = [...figure.querySelectorAll("svg.plot")].find(svg => svg.getClientRects().length > 0);

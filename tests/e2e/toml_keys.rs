@@ -3,7 +3,7 @@
 use dynocar_analysis::dataset::keys;
 use dynocar_tests::sources::{FOLDERS, is_of_tests, rust_files, without_tests, workspace};
 
-/// Files that hold the table: the keys, the numbers of a train, and the lists of a line beside their laws.
+/// Files that hold the table: the keys, the numbers of a train, and the lists of a line next to their laws.
 const TABLE: [&str; 4] = [
     "daemon/dataset/src/keys.rs",
     "daemon/model/src/terms/gradient.rs",

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use dynocar_tests::sources::{rust_files, workspace};
 
-/// Returns the sources of a program: its file, and the files beside a `main.rs` that has its own folder.
+/// Returns the sources of a program: its file, and the files next to a `main.rs` that has its own folder.
 fn program_sources(package: &str, file: &str) -> Vec<PathBuf> {
     match file.strip_suffix("/main.rs") {
         Some(folder) if folder != "src" => rust_files(&format!("{package}/{folder}")),

@@ -9,7 +9,7 @@ use loom::sync::atomic::Ordering::{Relaxed, SeqCst};
 use loom::sync::atomic::{AtomicU64, fence};
 use loom::thread;
 
-/// One attempt to fall asleep beside one publication; returns whether the thread sleeps and is not woken.
+/// Tries to fall asleep during one publication; returns whether the thread sleeps and is not woken.
 fn is_left_asleep(with_fences: bool) -> bool {
     let sample = Arc::new(AtomicU64::new(0));
     let sleeping = Arc::new(AtomicU64::new(0));

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use dynocar_tests::sources::{FOLDERS, is_of_tests, rust_files, without_tests, workspace};
 
 /// Words, as parts of a comment in lower case, that a reader would have to decipher.
-const RIDDLES: [&str; 5] = ["reckon", "astray", " told", "it is none", "so many"];
+const RIDDLES: [&str; 6] = ["reckon", "astray", " told", "it is none", "so many", " beside "];
 /// Whole words in lower case that stand in the place of a noun.
 const PRONOUNS: [&str; 2] = ["what", "whatever"];
 /// Comments that may hold such a word: file, part of the comment, and the reason.
@@ -234,8 +234,13 @@ fn riddles_and_tuples_are_found_wherever_they_stand() {
         paragraphs("/// One\n/// two.\n\n// Three\nlet a;\n"),
         [(1, "One two.".to_owned()), (4, "Three".to_owned())]
     );
-    for riddle in ["What it does.", "Returns what's left.", "Stops, whatever comes.", "So many m."]
-    {
+    for riddle in [
+        "What it does.",
+        "Returns what's left.",
+        "Stops, whatever comes.",
+        "So many m.",
+        "Lies beside it.",
+    ] {
         assert!(fault(riddle).is_some(), "{riddle}");
     }
     assert!(fault("Returns a somewhat lower speed in m/s.").is_none());

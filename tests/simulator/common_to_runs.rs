@@ -102,7 +102,7 @@ fn an_error_of_the_map_stays_right_where_the_line_rounds_its_steps() {
         .iter()
         .zip(&std)
         .filter(|((at_m, permille), (_, std))| (permille - truth.at(*at_m)).abs() < HALF_95 * std);
-    // Without the rounding beside it, half of the values hold.
+    // Without the rounding in the same fit, half of the values hold.
     assert!(held.count() * 10 >= 9 * found.len(), "{found:?} ± {std:?}");
 }
 

@@ -45,7 +45,7 @@ fn a_locomotive_that_leaps_ahead_of_its_wagons_does_not_pull_harder() {
     assert!(error < ERROR_MAX, "gains are off by {error:.4}");
 }
 
-/// Two equal cars on a level line, of which the first pulls: so heavy that they swing slowly beside a true step.
+/// Two equal cars on a level line, of which the first pulls: so heavy that they swing slowly compared with a true step.
 #[test]
 fn a_pulled_pair_settles_where_the_coupling_carries_the_wagon() {
     const MASS_KG: f64 = 10e6;

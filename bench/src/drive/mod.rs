@@ -60,7 +60,7 @@ pub struct DriveArguments {
     threads: usize,
     #[command(flatten)]
     output: OutputArguments,
-    /// Write the drives as CSV; FILE_answers and FILE_differences beside it
+    /// Write the drives as CSV; FILE_answers and FILE_differences next to it
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     /// Write the picture of the ordinary scenarios, as SVG

@@ -87,7 +87,7 @@ pub struct Scored {
     pub broken: Option<String>,
 }
 
-/// The legs of one kind of parameters beside all kinds, for the energy of the same stops.
+/// The legs of one kind of parameters, and those of all kinds, for the energy of the same stops.
 struct Drives<'a> {
     own: &'a [DrivenRecord],
     all: &'a [Vec<DrivenRecord>; 3],
@@ -206,7 +206,7 @@ fn answer(service: &Service, index: usize, driven: &[DrivenRecord], stops: usize
     all.first_use(record).number("changes_per_stop", changes / stops.max(1) as f64, 1)
 }
 
-/// The driver with Dynocar beside the one with declared parameters.
+/// Compares the driver with Dynocar to the one with declared parameters.
 fn comparison(
     service: &Service,
     [declared, learned, _]: &[Drives<'_>; 3],

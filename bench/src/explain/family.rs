@@ -42,7 +42,7 @@ impl SimulatedCase {
         SimulatorSettings { runs: self.runs, holdout_runs, ..settings }
     }
 
-    /// Writes the dataset, with its truth beside it, as `<kind>-<seed>` into a folder.
+    /// Writes the dataset, with its truth next to it, as `<kind>-<seed>` into a folder.
     ///
     /// # Errors
     ///

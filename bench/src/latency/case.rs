@@ -12,7 +12,7 @@ use crate::rig::pipelines;
 pub struct LatencyCase {
     /// `floor`, `dynocar/<pipeline>` or `alternative/<transport>`.
     pub name: String,
-    /// The answering side, and the programs and candidates beside it.
+    /// The answering side, and the programs and candidates that run with it.
     pub setting: Setting,
 }
 

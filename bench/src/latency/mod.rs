@@ -45,7 +45,7 @@ pub struct LatencyArguments {
     /// Only the cases whose name contains this, and the floors
     #[arg(long, value_name = "TEXT")]
     case: Option<String>,
-    /// Also measure with a recorder and a live view beside the daemon; their programs lie beside this one
+    /// Also measure with a recorder and a live view next to the daemon; their programs lie next to this one
     #[arg(long)]
     readers: bool,
     /// Also measure with two candidates on trial in the shadow of the daemon's model

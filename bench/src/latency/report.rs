@@ -116,7 +116,7 @@ fn record((case, trials): &Rounds, all: &[Rounds]) -> Record {
 }
 
 const SIZE: (u32, u32) = (1_240, 640);
-/// Width in px of the curves; their names stand beside them.
+/// Width in px of the curves; their names stand next to them.
 const CURVES_PX: u32 = 960;
 /// Height in px of a name, and of the names' first line.
 const NAME_PX: (i32, i32) = (22, 56);

@@ -156,7 +156,7 @@ impl DrivenMotion {
         sample
     }
 
-    /// Uniform between -1 and 1, by xorshift: cheap enough to stand beside a publish.
+    /// Returns a uniform number between -1 and 1, by xorshift: its time is small compared with a publication's.
     fn next_noise(&mut self) -> f64 {
         self.noise ^= self.noise << 13;
         self.noise ^= self.noise >> 7;

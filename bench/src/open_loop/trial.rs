@@ -63,7 +63,7 @@ impl Companion {
     }
 }
 
-/// The answering side, and the programs and candidates beside it.
+/// The answering side, and the programs and candidates that run with it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
     /// The answering side.

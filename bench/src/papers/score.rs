@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::row::PaperRow;
 use crate::statistics::{mean, root_mean_square, share};
 
-/// Errors, coverage and consistency of our method beside the errors of others on the same runs.
+/// Errors, coverage and consistency of our method, with the errors of others on the same runs.
 #[derive(Clone, Debug, Default)]
 pub struct PaperScore {
     /// Estimate minus truth.

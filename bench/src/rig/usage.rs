@@ -55,7 +55,7 @@ mod tests {
         assert!(usage.rss_bytes > 100_000 && usage.cpu_s > 0.0);
         assert_eq!((usage.waits_s[1], usage.preempted), (0.0, 0));
         let switches = std::thread::Builder::new().name("a name".into()).spawn(move || {
-            // Two threads that never rest on two cores beside others are made to wait.
+            // On few cores, a thread that never rests is made to wait while others never rest either.
             let start = std::time::Instant::now();
             while of(id, "a name").preempted == 0 && start.elapsed().as_secs() < 20 {}
             of(id, "a name").preempted

@@ -64,7 +64,7 @@ pub fn parse_train(label: &str, text: &str) -> Result<TrainModel, DatasetError> 
     Ok(model)
 }
 
-/// Reads the numbers of a table into a train; beside them it holds the other keys.
+/// Reads the numbers of a table into a train; `others` are the other keys that the table may hold.
 fn read_numbers(
     section: &Item,
     table: &str,

@@ -154,7 +154,7 @@ fn of_field(field: &'static Field) -> Option<RecordingColumn> {
 }
 
 impl RecordingColumn {
-    /// Returns a column that stands beside those of messages.
+    /// Returns a column of a table that holds attached files or metadata instead of messages.
     pub fn beside(name: &str, type_name: &'static str, is_nullable: bool) -> Self {
         RecordingColumn { is_nullable, ..plain(name.into(), type_name, "", ColumnSource::Number) }
     }

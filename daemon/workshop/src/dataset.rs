@@ -64,7 +64,7 @@ impl FilesOfDataset {
         Ok(FilesOfDataset::Recording(dataset))
     }
 
-    /// Returns true for a recording, beside which nothing of them lies.
+    /// Returns true for a recording, which holds all files of the dataset itself.
     pub fn is_recording(&self) -> bool {
         matches!(self, FilesOfDataset::Recording(_))
     }

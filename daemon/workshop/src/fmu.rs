@@ -48,7 +48,7 @@ fn shown(folders: &[PathBuf]) -> String {
     names.join(", ")
 }
 
-/// Returns the library of this release, where cargo or a package put it beside a program.
+/// Returns the library of this release from the folders near a program into which cargo or a package puts it.
 ///
 /// # Errors
 ///

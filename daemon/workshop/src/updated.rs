@@ -37,7 +37,7 @@ pub struct UpdatedFiles {
 
 /// Writes the updated model of a dataset into a folder as a dataset that can be explained again:
 /// `train.toml`, `track.toml` where something is known of the line, and a `dataset.toml` that names
-/// both and the runs where they lie. The runs of a recording are written beside it.
+/// both and the runs where they lie. The runs of a recording are written next to it.
 ///
 /// # Errors
 ///
@@ -208,7 +208,7 @@ pub fn keep_runs(
     Ok(())
 }
 
-/// Names the ways on the map, which lie beside the declared line's file.
+/// Names the alignments where they lie, next to the declared line's file.
 pub fn keep_alignments(track: &mut Table, declared: &Path, folder: &Path) {
     let beside = declared.parent().unwrap_or(Path::new(""));
     for file in alignment_files(track) {

@@ -78,7 +78,7 @@ impl Fmu {
         Fmu { component, said }
     }
 
-    /// An instance of the estimators that were unpacked beside this folder of resources.
+    /// Returns an instance of the estimators that were unpacked next to this folder of resources.
     pub fn new(resources: &str) -> Fmu {
         Fmu::from_model(&ESTIMATORS, resources)
     }

@@ -4,7 +4,7 @@
 //! changed or unchanged, in any combination; of the unsynced bytes of a file, none, half or all are there, or as many
 //! zeros. A renaming happens completely or not at all, as on every journalling file system.
 //!
-//! [`NotedDisk`] does the same beside a real folder, for tests that also read the files.
+//! [`NotedDisk`] does the same and also writes to a real folder, for tests that also read the files.
 
 mod noted;
 mod steps;

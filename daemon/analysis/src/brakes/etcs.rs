@@ -47,7 +47,7 @@ pub struct Basis {
     pub is_guess: bool,
 }
 
-/// Declared figures beside the stops.
+/// Declared figures that are used in addition to the stops.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DeclaredBrakeFigures {
     /// Level of confidence of Kdry_rst; `None` where none is supported.

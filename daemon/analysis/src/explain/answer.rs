@@ -225,7 +225,7 @@ pub struct WithStd {
 pub struct DriveAnswer {
     /// Share of the power that reaches the rims, for the declared mass: both scale alike.
     pub efficiency: WithStd,
-    /// Power in kW that is fed beside the drive; absent where the drive's own power is recorded.
+    /// Power in kW that is fed in addition to the power of the drive; absent where the drive's own power is recorded.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub auxiliary_power_kw: Option<WithStd>,
     /// The declared efficiency, with which forces were read; absent where the usual one was.

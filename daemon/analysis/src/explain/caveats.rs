@@ -61,7 +61,7 @@ pub fn trimmed(sentences: &[String]) -> Vec<String> {
     trimmed.filter(|it| !it.is_empty()).collect()
 }
 
-/// Describes the certain and small effects beside those that are named; empty without either.
+/// Describes the certain and small effects in addition to the named ones; empty if either are missing.
 fn small_effects(outcome: &SearchOutcome, effects: &[EffectAnswer]) -> String {
     let small: Vec<String> = outcome.small_trials().map(|it| small(outcome, it)).collect();
     if small.is_empty() || effects.is_empty() {

@@ -42,7 +42,7 @@ pub struct AtBound {
     pub bound: f64,
 }
 
-/// Context that a report may need beside the parameters of the effect itself.
+/// Context that a report may need in addition to the parameters of the effect itself.
 pub struct ReportContext<'a> {
     /// Parameters of the effect.
     pub parameters: &'a [f64],

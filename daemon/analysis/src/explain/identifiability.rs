@@ -32,7 +32,7 @@ pub fn identifiability(search: &Search, outcome: &SearchOutcome) -> Vec<Identifi
         theta.push(candidate.hypothesis.none());
     }
     let information = search.problem.at(&model, theta, outcome.fit.noise).information();
-    // Standard deviation of one with some others beside the fitted parameters.
+    // Standard deviation of one kind, estimated jointly with the fitted parameters and with the other kind, if given.
     let std = |own: usize, other: Option<usize>| {
         let free: Vec<usize> =
             (0..fitted).chain(other.map(|k| fitted + k)).chain([fitted + own]).collect();

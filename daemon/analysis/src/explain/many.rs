@@ -176,8 +176,9 @@ fn is_common(fit: &Fit) -> bool {
 }
 
 impl<E: From<RunDataError> + Send> Many<'_, E> {
-    /// Moves a model that was found in the held runs, thinned, to where all fit it best as they were recorded: beside
-    /// the usual errors, and the one that predicts. False where it stays, since only some runs show its effects.
+    /// Moves a model that was found in the held, thinned runs to its best fit to all runs as they were recorded: both
+    /// the fit jointly with the usual errors and the fit that predicts. Returns false where the model stays, since only
+    /// some runs show its effects.
     pub(super) fn join(
         &self,
         search: &Search,

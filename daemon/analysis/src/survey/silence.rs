@@ -90,7 +90,7 @@ fn between(ends: [[f64; 2]; 2], trace: &[TracePoint]) -> Option<(f64, Vec<[f64; 
 mod tests {
     use super::*;
 
-    /// Returns a quarter of a circle of 1 km, 20 m from point to point, `left_m` beside it.
+    /// Returns a quarter of a circle with a radius of 1 km less `left_m`, about 20 m from point to point.
     fn quarter(left_m: f64, open: std::ops::Range<usize>) -> Vec<TracePoint> {
         let point = |k: usize| {
             let angle = 0.02 * k as f64;

@@ -264,7 +264,7 @@ mod tests {
     fn after_n_updates_regularised_rls_is_the_ridge_solution_of_the_criterion() {
         let rows = rows(30);
         let (lambda, p0) = (3.0, 1e9);
-        // lambda/2 |theta|^2 beside the sum of squares: its gradient adds lambda/2 I.
+        // lambda/2 |theta|^2 in addition to the sum of squares: its gradient adds lambda/2 I.
         let normal = rows.iter().fold(Matrix3::identity() * (0.5 * lambda), |sum, (row, _)| {
             sum + row * row.transpose()
         });

@@ -160,7 +160,7 @@ mod tests {
             information.update(&SVector::<f64, 2>::new(row[1], row[2]), row[0]);
         }
 
-        // Differences of neighbours: covariance walk + 2 noise on the diagonal, -noise beside.
+        // Differences of neighbours: covariance walk + 2 noise on the diagonal, -noise next to it.
         let rows = count - 1;
         let covariance = DMatrix::from_fn(rows, rows, |i, j| match i.abs_diff(j) {
             0 => walk + 2.0 * noise,

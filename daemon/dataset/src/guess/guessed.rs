@@ -88,7 +88,7 @@ pub struct GuessedRun {
     pub rows: usize,
     /// -1 where the position falls, else 1.
     pub direction: i8,
-    /// The day in a column of dates beside clock times, counted from 1970-01-01.
+    /// The day in a column of dates that belongs to clock times, counted from 1970-01-01.
     pub day: Option<i64>,
 }
 

@@ -65,7 +65,7 @@ pub struct ResistanceKalman {
 }
 
 impl ResistanceKalman {
-    /// Returns a filter for a train; `beside` learns the noise.
+    /// Returns a filter for a train; `least_squares` learns the noise.
     pub fn new(
         train: &TrainModel,
         settings: KalmanSettings,

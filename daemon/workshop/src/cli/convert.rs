@@ -27,7 +27,7 @@ pub struct ConvertArguments {
     /// The train's file, for a recording to which none is attached
     #[arg(long, value_name = "FILE")]
     train_file: Option<PathBuf>,
-    /// The line's file, beside --train-file
+    /// The line's file, together with --train-file
     #[arg(long, value_name = "FILE", requires = "train_file")]
     track_file: Option<PathBuf>,
     /// Print only problems

@@ -53,7 +53,7 @@ pub struct ExplainArguments {
     /// Write a report for people: one HTML page that needs nothing else
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
-    /// Write a recording with verdict, effects, residual and predicted speeds beside the data
+    /// Write a recording with verdict, effects, residual and predicted speeds in addition to the data
     #[arg(long, value_name = "FILE.mcap")]
     annotate: Option<PathBuf>,
     /// Write the report's plots as SVG files into this folder

@@ -42,7 +42,7 @@ pub struct FmuArguments {
     /// Write the dataset's runs as inputs of the FMU into this folder, a CSV file each
     #[arg(long, value_name = "FOLDER", requires = "dataset")]
     inputs: Option<PathBuf>,
-    /// The library inside the FMU, where it does not lie beside the program
+    /// The library inside the FMU, where it does not lie next to the program
     #[arg(long, value_name = "FILE.so")]
     library: Option<PathBuf>,
 }

@@ -23,7 +23,7 @@ fn count(text: &str) -> Result<usize, String> {
 }
 
 impl Threads {
-    /// Returns one core where no number is given: such a command runs beside a daemon that serves trains.
+    /// Returns one core where no number is given: such a command runs while a daemon serves trains.
     pub fn or_one(self) -> Self {
         Threads { count: self.count.or(Some(1)) }
     }

@@ -63,7 +63,7 @@ pub struct Asked {
     pub key: &'static str,
     /// The question, with its unit.
     pub question: &'static str,
-    /// Comment beside it in the file.
+    /// Comment next to it in the file.
     note: &'static str,
 }
 

@@ -35,7 +35,7 @@ pub struct ModelFiles {
 /// Why a recording becomes no dataset.
 #[derive(Debug, thiserror::Error)]
 pub enum ToDatasetError {
-    /// It, or a file that was given beside it, cannot be read.
+    /// The recording, or a file that was given with it, cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
     /// A file of the dataset cannot be written.

@@ -106,7 +106,7 @@ pub fn vehicle(dataset: &Dataset) -> Vehicle {
     }
 }
 
-/// Returns a line surveyed before, from its `track.toml` and the alignments beside it.
+/// Returns a line surveyed before, from its `track.toml` and the alignments next to it.
 ///
 /// # Errors
 ///

@@ -246,7 +246,7 @@ pub fn late_s(survey: &Survey) -> f64 {
 enum Source {
     /// A field of the samples.
     Field(SampleField),
-    /// Quantity recorded beside them.
+    /// Quantity recorded in addition to the samples.
     Extra,
     /// Made of several, see `run_csv`.
     Made,

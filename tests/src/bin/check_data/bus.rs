@@ -134,7 +134,7 @@ fn learned(answer: &SurveyAnswer) -> Result<String, String> {
 
 fn left_out(folder: &Path, whole: &SurveyAnswer) -> Result<LeftOut, String> {
     let trips = &whole.trips;
-    // A trip's recording reaches to the middle of the stands beside it.
+    // A trip's recording reaches to the middle of the standstills before and after it.
     let middles: Vec<f64> =
         trips.windows(2).map(|pair| 0.5 * (pair[0].to_s + pair[1].from_s)).collect();
     let mut all = LeftOut::default();

@@ -124,7 +124,7 @@ impl Hypothesis for Slippery {
         let parameters = if is_ratio { &adhesion::RATIO } else { &adhesion::CAP };
         Nature {
             choice_cost: self.site.choice_cost,
-            // A cap is no factor on a shape, and a map's error is small beside a brake force.
+            // A cap is no factor on a shape, and a map's error is small compared with a brake force.
             shared_error: if is_ratio { self.site.map_error } else { 0.0 },
             affine_in: is_ratio.then_some(|ratio| ratio),
             ..Nature::new(EffectKind::LowAdhesion, parameters)

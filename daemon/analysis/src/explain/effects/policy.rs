@@ -48,14 +48,14 @@ pub struct Everyday {
 pub struct Policy {
     /// Where it may be certain.
     pub certainty: Certainty,
-    /// Kinds that take its place where they explain more than it beside the usual errors.
+    /// Kinds that take its place where they explain more than it jointly with the usual errors.
     pub gives_way_to: &'static [EffectKind],
-    /// Kinds in the model beside which it is not certain.
+    /// Kinds that keep it from being certain while the model has one of them.
     pub uncertain_with: &'static [EffectKind],
     /// Whether its form or place is one of many, even if no end of it was estimated: it must also take from the error.
     pub is_one_of_many: bool,
     /// Whether a wrong gradient or wheel leaves such a force where pieces of the line end, so that a place that was
-    /// chosen is not certain beside these.
+    /// chosen is not certain jointly with these.
     pub is_left_by_moved_places: bool,
     /// Whether it is sought with the usual errors in the model: it acts on the train by one law at every place.
     pub is_sought_with_nuisance: bool,
@@ -65,7 +65,7 @@ pub struct Policy {
     pub is_late: bool,
     /// Whether it acts in the runs in which it is found and in no others.
     pub is_passing: bool,
-    /// Figures that it estimates, which have no usual error beside it.
+    /// Declared figures that it estimates: a joint fit gives them no usual error.
     pub frees: &'static [DeclaredFigure],
 }
 

@@ -23,7 +23,7 @@ impl Candidate {
         Candidate { hypothesis: Arc::new(hypothesis), start }
     }
 
-    /// Whether it has ends, runs or a course along the line, of which there are many.
+    /// Returns whether it has ends, runs or a course along the line, of which there are many.
     pub fn is_chosen_among_many(&self) -> bool {
         let of = &self.hypothesis;
         !of.ends().is_empty() || of.is_event() || of.is_gradient()

@@ -49,8 +49,8 @@ pub(super) fn replace_outliers(values: &mut [f64], least: f64) -> usize {
 /// A force counts as an outlier when it leaves its neighbours by a tenth of the run's greatest
 /// force, a speed by 0.25 m/s: less than that averages out. Samples more than `SPARSE_S` apart
 /// cannot distinguish an outlier from a short application of the brake, or from the bend of a speed where
-/// it ends: forces stay, but for those beside a missing one, of which nobody knows how long they
-/// last, and speeds may bend as sharply as a train's do.
+/// it ends: forces stay, except those next to a missing one, whose duration is unknown, and speeds
+/// may bend as sharply as a train's do.
 pub(super) fn clean(samples: &mut [ResolvedSample], period_s: f64) -> usize {
     let mut speeds: Vec<f64> = samples.iter().map(|sample| sample.speed_mps).collect();
     let is_sparse = period_s > SPARSE_S;

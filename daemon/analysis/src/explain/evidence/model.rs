@@ -33,12 +33,12 @@ impl UpdatedModel {
         self.effects.iter().position(|effect| effect.kind() == kind)
     }
 
-    /// Whether it has an effect of a kind.
+    /// Returns whether it has an effect of a kind.
     pub fn has(&self, kind: EffectKind) -> bool {
         self.position(kind).is_some()
     }
 
-    /// The model without one effect, and its parameters.
+    /// Returns the model without one effect, and its parameters.
     pub fn without(&self, theta: &[f64], index: usize) -> (Self, Vec<f64>) {
         let (mut model, range) = (self.clone(), self.ranges()[index].clone());
         model.effects.remove(index);

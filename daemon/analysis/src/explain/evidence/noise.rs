@@ -39,8 +39,9 @@ impl Noise {
         scatter_most: RunScatter::MOST,
     };
 
-    /// The same with a small and a smaller share of the fading force only: under it a lasting force counts in full,
-    /// which a noise estimated beside an undeclared force takes for noise. One where the smaller is no less.
+    /// Returns the noise with a small and with a smaller share of the fading force only: under it a lasting force
+    /// counts in full, while a noise that was estimated in the presence of an undeclared force takes that force for
+    /// noise. Returns only one where the smaller is no less.
     pub fn stiffer(self) -> Vec<Noise> {
         let stiff = |share: f64| Noise {
             fading_var: (share * self.fading_var).max(FADING_VAR_MIN),

@@ -57,7 +57,7 @@ impl Distances {
         self.by_position_m - self.by_speed_m
     }
 
-    /// Whether a balise corrected the position.
+    /// Returns whether a balise corrected the position.
     pub fn is_corrected(&self) -> bool {
         self.missed_m().abs() > CORRECTION_MIN_M
     }

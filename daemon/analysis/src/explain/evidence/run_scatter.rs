@@ -33,7 +33,7 @@ const DELAY_S: f64 = 0.02;
 
 /// Weight of the prior of the scatter between runs, as a number of runs.
 pub const PRIOR_RUNS: f64 = 4.0;
-/// The same of loads and winds, where they stand beside a finished model: the runs show these themselves.
+/// The same of loads and winds that are fitted jointly with a finished model: the runs show these themselves.
 const PRIOR_RUNS_BESIDE: f64 = 0.5;
 
 impl RunScatter {

@@ -97,7 +97,7 @@ impl Settling {
     }
 }
 
-/// Whether two beliefs are one.
+/// Returns whether two beliefs differ by so little that they count as one.
 fn is_converged(from: &Matrix2<f64>, now: &Matrix2<f64>) -> bool {
     let is_near = |one: f64, other: f64| (one - other).abs() <= SETTLED_SHARE * other.abs();
     from.iter().zip(now.iter()).all(|(from, now)| is_near(*from, *now))
@@ -265,7 +265,7 @@ impl BinWhitener {
         }
     }
 
-    /// The same of a few beside each other, which do not wait for each other.
+    /// Puts in the place of a few series their innovations, in one loop: no series waits for another.
     fn whiten_together<const N: usize>(&self, series: [&mut [f64]; N]) {
         let mut series = series.map(|it| &mut it[..self.steps.len()]);
         let mut tracked: [Tracked; N] = array::from_fn(|_| Tracked::default());

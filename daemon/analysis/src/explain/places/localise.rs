@@ -158,7 +158,7 @@ pub fn find(scan: &Scan, shape: Shape, inside: Inside) -> Option<FoundIntervals>
         found = added;
     }
     if found.intervals_m.len() > 1 {
-        // Each was found beside those before it alone, and the runs by the first: others end before they reach it.
+        // Each was found given the earlier intervals only, and the runs by the first: others end before they reach it.
         for _ in 0..SWEEPS {
             places.choose_runs(&mut found, runs_min);
             (0..found.intervals_m.len()).for_each(|index| places.polish(&mut found, index));

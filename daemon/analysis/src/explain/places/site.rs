@@ -106,7 +106,7 @@ impl Site {
         self.sections.as_ref().map_or(&[], |sections| &sections.intervals_m)
     }
 
-    /// Whether it may be in a run.
+    /// Returns whether it may be in a run.
     pub fn is_in(&self, run: &RunData) -> bool {
         self.runs.as_ref().is_none_or(|runs| runs.contains(&run.file))
     }

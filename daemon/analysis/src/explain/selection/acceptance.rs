@@ -67,7 +67,7 @@ pub(super) fn is_accepted(fit: &Fit, index: usize, evidence: f64, reduction: f64
 }
 
 /// Returns the score that decided for an effect of a fitted model: its acceptance score, or the least that accepts
-/// where it was accepted because it is certain, here or beside the usual errors.
+/// where it was accepted because it is certain, in this fit or jointly with the usual errors.
 pub fn deciding_score(
     fit: &Fit,
     index: usize,
@@ -114,7 +114,7 @@ pub(super) fn is_certain(
         _ if is_by_run => true,
         _ => stds_from_none(fit, index) > CERTAIN_STDS,
     };
-    // At most 2.3 where nothing acts; beside the usual errors 2.3 for a brake, 2.8 for a tunnel, 0.3 for a form.
+    // At most 2.3 where nothing acts; jointly with the usual errors 2.3 for a brake, 2.8 for a tunnel, 0.3 for a form.
     let takes_enough = evidence * reduction > EQUAL;
     let is_sure = if is_by_run {
         // Other differences between runs may follow the measurement: at most 9.6 where nothing acts.
@@ -128,8 +128,8 @@ pub(super) fn is_certain(
     is_sure && !needs_the_score && has_runs && is_shown(fit, index) && runs_agree()
 }
 
-/// Whether an effect leaves a force where pieces of the line end: a gradient, or a wheel by which positions are counted
-/// between fixes.
+/// Returns whether an effect leaves a force where pieces of the line end: a gradient, or a wheel by which positions are
+/// counted between fixes.
 pub(super) fn moves_places(effect: &SharedHypothesis) -> bool {
     effect.is_gradient() || effect.nature().changes_speed_scale
 }
@@ -140,7 +140,7 @@ pub(super) fn is_left_by_moved_places(effect: &SharedHypothesis) -> bool {
     policy_of(effect.kind()).is_left_by_moved_places && is_chosen_among_many(effect)
 }
 
-/// Whether the form, place or run of an effect was chosen among many.
+/// Returns whether the form, place or run of an effect was chosen among many.
 fn is_chosen_among_many(effect: &SharedHypothesis) -> bool {
     policy_of(effect.kind()).is_one_of_many || !effect.ends().is_empty()
 }

@@ -78,8 +78,8 @@ impl Search<'_> {
         joint
     }
 
-    /// The errors of the map and how it rounds its steps, also beside a greater error that the runs show of it; none
-    /// where there is no map or no measured position.
+    /// Returns the errors of the map and the rounding of its steps, also for a model with a greater error of the map
+    /// that the runs show; empty where there is no map or no measured position.
     fn map_errors(&self, fit: &Fit) -> Vec<Candidate> {
         let track = self.track.filter(|_| self.problem.positions.distance_ratio.is_some());
         let span_m = self.scan(fit).and_then(|scan| span_m(&scan));
@@ -148,7 +148,7 @@ impl Search<'_> {
         true
     }
 
-    /// The model beside the usual errors with the map's error in the shape that was fitted.
+    /// Returns the model jointly with the usual errors, with the map's error in the shape that was fitted.
     fn with_map_as_fitted(&self, fit: &Fit, joint: &Fit) -> Fit {
         let (effects, ranges) = (&joint.model.effects, joint.model.ranges());
         let usual = (fit.model.effects.len()..effects.len()).map(|number| {

@@ -75,7 +75,7 @@ impl NuisanceFit {
         fit.theta == from && effects.all(|(one, other)| Arc::ptr_eq(one, other))
     }
 
-    /// Whether nothing is left of an effect: the 95 % interval of its size holds none.
+    /// Returns whether nothing is left of an effect: the 95 % interval of its size holds zero.
     pub(super) fn holds_none(&self, index: usize) -> bool {
         let range = self.fit.model.ranges()[index].clone();
         let size = self.fit.model.effects[index].size(&self.fit.theta[range.clone()]);
@@ -83,8 +83,8 @@ impl NuisanceFit {
         size.abs() < HALF_95 * std
     }
 
-    /// Whether a change of mass in single runs is the usual scatter of loads: the largest of several deviations is
-    /// about √(2 ln n) of their standard deviation, which the other runs show.
+    /// Returns whether a change of mass in single runs is the usual scatter of loads: the largest of several deviations
+    /// is about √(2 ln n) of their standard deviation, which the other runs show.
     pub(super) fn is_as_loads_are(&self, index: usize) -> bool {
         let fit = &self.fit;
         let effect = &fit.model.effects[index];
@@ -138,7 +138,7 @@ impl SearchOutcome {
         self.fit.model.effects.iter().map(|effect| effect.kind()).collect()
     }
 
-    /// The finished model with the usual errors beside it, where it was fitted so.
+    /// Returns the finished model jointly with the usual errors; `None` where it was not fitted so.
     pub fn nuisance_fit(&self) -> Option<Arc<NuisanceFit>> {
         self.nuisance_fit.as_ref().map(|(_, joint)| joint.clone())
     }
@@ -148,12 +148,12 @@ impl SearchOutcome {
         self.nuisance_fit = Some((self.likeliest.theta.clone(), joint.into()));
     }
 
-    /// Whether nothing more is looked for.
+    /// Returns whether nothing more is looked for.
     pub(super) fn is_full(&self) -> bool {
         self.fit.model.effects.len() >= EFFECTS_MAX + self.small.len()
     }
 
-    /// Whether another kind may take the place of one of the model, or none.
+    /// Returns whether an effect of the model may be removed or replaced by another kind.
     pub(super) fn is_on_trial(&self, kind: EffectKind) -> bool {
         self.is_named(kind) && !self.is_certain(kind)
     }
@@ -164,7 +164,7 @@ impl SearchOutcome {
         self.certain.iter().any(|(certain, _)| *certain == kind)
     }
 
-    /// Kinds that are not looked for again.
+    /// Returns the kinds that are not looked for again.
     pub(super) fn fallen_kinds(&self) -> Vec<EffectKind> {
         self.fallen.iter().map(|(kind, _)| *kind).collect()
     }

@@ -42,7 +42,7 @@ impl Search<'_> {
         outcome.instead = tried;
     }
 
-    /// Replaces an effect by a kind that explains more than it beside the usual errors; returns whether it did.
+    /// Replaces an effect by a kind that explains more than it jointly with the usual errors; returns whether it did.
     /// Without the usual errors an effect that can take their form would win.
     pub(super) fn give_way(&self, outcome: &mut SearchOutcome) -> bool {
         let may_give_way = |kind: &EffectKind| {
@@ -66,9 +66,9 @@ impl Search<'_> {
         true
     }
 
-    /// Puts a kind as one number of the whole train or line, such as the drag of all mapped tunnels, in the stead of
-    /// the same kind at chosen places where that explains more beside the usual errors; returns whether it did. Errors
-    /// of the map make places of anything, and the more runs pass them, the surer.
+    /// Puts a kind as one number of the whole train or line, such as the drag of all mapped tunnels, in the place of
+    /// the same kind at chosen places where that explains more jointly with the usual errors; returns whether it did.
+    /// Errors of the map make places of anything, and the more runs pass them, the surer.
     pub(super) fn return_to_whole(&self, outcome: &mut SearchOutcome) -> bool {
         let effects = &outcome.fit.model.effects;
         let whole = effects.iter().enumerate().find_map(|(index, effect)| {

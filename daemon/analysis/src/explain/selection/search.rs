@@ -183,7 +183,7 @@ impl Search<'_> {
         fit.cost + model_penalty(fit)
     }
 
-    /// The model without one effect, refitted.
+    /// Returns the model without one effect, refitted.
     pub fn without(&self, fit: &Fit, index: usize) -> Fit {
         let (model, start) = fit.model.without(&fit.theta, index);
         self.problem.fit_with_noise(&model, start, fit.noise)

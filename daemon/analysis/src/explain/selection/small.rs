@@ -30,9 +30,9 @@ fn is_certain_and_small(trial: &EffectTrial) -> bool {
 }
 
 impl Search<'_> {
-    /// The model with all everyday kinds among the trials that are certain, and only for their size no effects, beside
-    /// each other, the most usual first; `None` without one. Late forces and a late speed look alike: one of them is
-    /// enough.
+    /// Returns the model with all everyday kinds among the trials that are certain jointly with each other, and only
+    /// for their size no effects, the most usual first; `None` without one. Late forces and a late speed look alike:
+    /// one of them is enough.
     pub(super) fn with_certain_and_small(
         &self,
         trials: &[EffectTrial],
@@ -91,7 +91,8 @@ impl Search<'_> {
         }
     }
 
-    /// Everyday scales of which nothing is left beside the usual errors: the 95 % interval there holds none.
+    /// Returns the everyday scales of which nothing is left jointly with the usual errors: the 95 % interval of their
+    /// size holds zero.
     fn usual_scales(&self, outcome: &mut SearchOutcome) -> Vec<EffectKind> {
         let is_scale = |effect: &SharedHypothesis| {
             policy_of(effect.kind()).everyday.is_some() && effect.parameters().len() == 1

@@ -33,7 +33,7 @@ impl ScaleSources {
         })
     }
 
-    /// Whether they are further apart than their 95 % intervals allow.
+    /// Returns whether they are further apart than their 95 % intervals allow.
     pub fn are_apart(&self) -> bool {
         let allowed = HALF_95 * (self.positions.std + self.motion.std);
         (self.positions.value - self.motion.value).abs() > allowed

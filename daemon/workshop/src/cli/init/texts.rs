@@ -190,7 +190,7 @@ const REPLACED: [(&str, &str); 5] = [
     ),
 ];
 
-/// Returns the daemon's configuration: the recommended set for the train beside it.
+/// Returns the daemon's configuration: the recommended set for the train file next to it.
 pub fn daemon(has_track: bool) -> String {
     let text = REPLACED
         .iter()

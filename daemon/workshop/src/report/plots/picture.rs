@@ -16,7 +16,7 @@ use serde_json::json;
 use super::reading::{self, PointerReading};
 use crate::report::html::escape;
 
-/// Returns the name of the model without effects, as it stands beside its data.
+/// Returns the name of the model without effects, as plots show it next to the data.
 pub(super) fn before_name(has_effect: bool) -> &'static str {
     if has_effect { "before" } else { "model" }
 }

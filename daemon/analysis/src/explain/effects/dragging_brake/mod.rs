@@ -32,7 +32,7 @@ struct Dragging {
     choice_cost: f64,
 }
 
-/// Its runs are chosen among many, which the usual errors of single runs stand for; beside slippery rails a
+/// Its runs are chosen among many, which the usual errors of single runs stand for; on slippery rails a
 /// slide looks like a brake that drags.
 pub const POLICY: Policy = Policy {
     certainty: Certainty::WithNuisance,

@@ -135,7 +135,7 @@ impl Band {
         self.files.iter().position(|file| *file == run.file)
     }
 
-    /// Whether a sample of a run with this number lies in it.
+    /// Returns whether a sample of a run with this number lies in it.
     #[inline]
     fn holds(&self, run: &RunData, number: Option<usize>, index: usize) -> bool {
         let value = self.axis.value(run, number, index);

@@ -178,7 +178,7 @@ pub fn edges(form: Form) -> usize {
     }
 }
 
-/// Whether a number of a form is an exponent.
+/// Returns whether a number of a form is an exponent.
 pub fn is_exponent(form: Form, number: usize) -> bool {
     form == Form::Power && number == 1
 }

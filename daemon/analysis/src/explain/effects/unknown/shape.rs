@@ -69,7 +69,7 @@ impl<'s> Ground<'s> {
         self.tried_at(factors, &values, holds_exponents)
     }
 
-    /// The same of factors whose values are known.
+    /// Returns the gain of a force of factors whose values are known.
     pub fn tried_at(
         &self,
         factors: Vec<CovariateFactor>,

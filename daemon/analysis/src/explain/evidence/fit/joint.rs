@@ -85,8 +85,8 @@ impl FitProblem {
     }
 }
 
-/// Whether one of the first `count` effects that looks back moves from one fit to another by more than a part of its
-/// standard deviation.
+/// Returns whether one of the first `count` effects that looks back moves from one fit to another by more than a part
+/// of its standard deviation.
 fn is_moved(from: &Fit, to: &Fit, count: usize) -> bool {
     let Some(covariance) = from.factor().map(|factor| factor.inverse()) else { return false };
     let effects = from.model.effects.iter().zip(from.model.ranges()).take(count);

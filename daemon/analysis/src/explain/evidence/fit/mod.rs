@@ -194,7 +194,7 @@ impl Fit {
         &self.run_filters[index].whitener
     }
 
-    /// Whether loads and winds of each run stand beside it.
+    /// Returns whether loads and winds of each run are fitted jointly with the model.
     pub fn has_loads_and_winds(&self) -> bool {
         self.noise.scatter_most == RunScatter::MOST_BESIDE
     }
@@ -249,7 +249,7 @@ impl FitProblem {
         own.filter_map(|run| run.span_m).reduce(union)
     }
 
-    /// Whether positions show that the speed is late.
+    /// Returns whether positions show that the speed is late.
     pub fn is_position_ahead(&self) -> bool {
         self.positions.speed_late_s.is_some_and(|(late_s, _)| late_s > 0.0)
     }
@@ -296,7 +296,7 @@ impl FitProblem {
         (count > 0.0).then(|| (n_per_kn, n_per_kn * count / basic))
     }
 
-    /// The model with a, b, c as declared and the effects at given parameters.
+    /// Returns the parameters of the model with a, b, c as declared and the effects at given parameters.
     pub fn start(&self, effects: &[f64]) -> Vec<f64> {
         let Davis { a, b, c } = self.declared;
         [a, b, c].iter().chain(effects).copied().collect()

@@ -198,7 +198,7 @@ fn reckon(At { plan, run, theta, .. }: At) -> Response {
     response
 }
 
-/// Whether parameters lie within a step of others, and a, b, c within a small share: a slope is a difference
+/// Returns whether parameters lie within a step of others, and a, b, c within a small share: a slope is a difference
 /// over a step, and no other so near.
 fn is_near(at: &[f64], known: &[f64], steps: &[f64]) -> bool {
     let resistance =
