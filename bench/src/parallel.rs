@@ -4,8 +4,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::ending;
 
-/// Does `work` on every case on `threads` threads of its own, so that the work may use the threads of rayon; returns
-/// the results in the order of the cases.
+/// Does `work` on every case. It runs on `threads` new threads, not on rayon's, so that `work` itself may use rayon.
+/// Returns the results in the order of the cases.
 ///
 /// # Panics
 ///
@@ -18,7 +18,8 @@ pub fn over<C: Sync, R: Send>(
     over_while(cases, threads, work, || true)
 }
 
-/// Does the same until the command is to end; returns the results of the first cases.
+/// Does the same, but begins no further case once the command is to end. Returns the results of the cases that were
+/// begun, the first ones.
 ///
 /// # Panics
 ///

@@ -1,9 +1,9 @@
 //! Files that are replaced as a whole, even when a process dies or the power fails.
 //!
-//! New content is written into another file, brought to the disk and renamed over the old file, and the directory is
-//! brought to the disk. At every moment the name holds the old content or the new, never a part of one; when
-//! [`replace`] has returned, it holds the new for good. A file, or a folder with files, that must never be replaced
-//! takes its name in the same way, but only where the name is free: [`write_once`], [`make_once`].
+//! New content is written into another file, synced to the disk and renamed over the old file; then the directory is
+//! synced. At every moment the name holds the old content or the new, never a part of one; when [`replace`] has
+//! returned, it holds the new for good. A file or folder that must never be replaced is written in the same way, but
+//! gets its name only if nothing else has that name: [`write_once`], [`make_once`].
 
 use std::fs::{File, OpenOptions, Permissions};
 use std::io::{self, ErrorKind, Write};

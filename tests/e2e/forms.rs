@@ -1,4 +1,5 @@
-//! Forces by laws that the library of effects lacks, their forms, and the predictions of these forms.
+//! Forces whose laws the library of effects lacks: `explain` calls them unknown but reports their form, and the model
+//! with that form predicts nearly as well as the true one.
 
 use dynocar_analysis::explain::answer::{ExplainAnswer, Verdict};
 use dynocar_analysis::explain::explain;
@@ -19,7 +20,8 @@ fn simulated(seed: u64) -> (SimulatedDataset, Law) {
     (simulated, law)
 }
 
-/// Returns the answer on a force that must be called unknown, its forms, and its error over the true model's.
+/// Returns the answer, which must call the force unknown, the forms of the force that it reports, and the error of the
+/// explained model divided by that of the true model.
 fn explained(simulated: &SimulatedDataset) -> (ExplainAnswer, Vec<ExtraResistance>, f64) {
     let dataset = read_files(&dataset_files(simulated));
     let explanation = explain(&dataset, &|_, _| {}).expect("usable runs");

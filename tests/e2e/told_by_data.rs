@@ -1,4 +1,5 @@
-//! The undetermined parts of an answer are stated.
+//! An answer states everything that the data do not determine: coefficients of the resistance, effects, and effects
+//! that look alike.
 
 use std::fmt::Write as _;
 use std::path::Path;

@@ -1,4 +1,5 @@
-//! No test stands where it is never run: in a target whose tests are not built, or on pages whose code is not run.
+//! No test and no example stands where it is never run: no test in a target whose tests are switched off, no code in
+//! the doc comments of a target whose doctests are switched off.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +13,8 @@ fn program_sources(package: &str, file: &str) -> Vec<PathBuf> {
     }
 }
 
-/// Returns the first line with a test, or with code on a page where no code may stand; a block of text is not code.
+/// Returns the first line with a test or with a code block in a doc comment, if the target does not run such; a block
+/// marked `text` is not code.
 fn unrun(text: &str, (has_tests, has_code): (bool, bool)) -> Option<&str> {
     let mut is_open = false;
     text.lines().find(|line| {

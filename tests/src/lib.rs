@@ -5,8 +5,8 @@
 //! - [`browser`]: a headless browser that reports the state of a page
 //! - [`documents`]: the pages, their links and the commands that they show
 //! - [`fuzz`]: mutations of a corpus, given to every reader of foreign bytes
-//! - [`golden`]: estimates of every estimator from the recorded runs, bit for bit; settings of every estimator with
-//!   less work
+//! - [`golden`]: estimates of every estimator from the demo's recorded runs, bit for bit; default estimators, with
+//!   cheaper windows of expectation maximisation
 //! - [`power_cut`]: a disk that loses unsynced writes
 //! - [`process`]: real processes with a run-time directory of their own, cleaned up on drop
 //! - [`sensor_failures`]: how sensors and channels fail

@@ -17,7 +17,7 @@ pub struct ParameterGrade {
     pub name: String,
     /// Error over the size of the effect.
     pub error: f64,
-    /// Error over the standard deviation.
+    /// Error divided by the standard deviation that the answer states.
     pub z: f64,
 }
 

@@ -1,8 +1,9 @@
 //! `dynocar-bench latency`: from the appointed time of a sample to the poll that brings its
 //! snapshot, through real processes on cores of their own.
 //!
-//! Every round goes through all cases once, in an order drawn anew from the seed, so that the other work of the machine
-//! falls on all of them alike. Ratios to the floor are taken within a round; the median of the rounds is reported.
+//! Every round goes through all cases once, in an order drawn anew from the seed, so that the other work of the
+//! machine falls on all of them alike. Ratios to the floor, an echo on the daemon's channels without an estimator, are
+//! taken within a round; the median of the rounds is reported.
 //!
 //! - [`case`]: cases that are measured together, and the other readers of their channels
 //! - [`costs`]: one poll and one publish

@@ -1,4 +1,4 @@
-//! The pipelines that a measurement names.
+//! Pipelines for measurements: with default settings, and by the names on the command line.
 
 use std::sync::Arc;
 

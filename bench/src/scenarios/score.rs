@@ -1,4 +1,4 @@
-//! Scores of answers over a drive.
+//! Scores of a pipeline's answers, its usable estimates of a quantity, over a drive.
 
 use dynocar_shared::{HALF_95, Uncertain};
 
@@ -9,7 +9,8 @@ use crate::statistics::median;
 pub const COUNTS_MPS: f64 = 2.0;
 /// Number of standard deviations beyond which an answer is wrong.
 const WRONG: f64 = 4.0;
-/// Share of the truth by which an answer's error must exceed the declaration's before the answer counts as worse.
+/// Share of the truth by which the error of an answer must exceed that of the declared value before the answer counts
+/// as worse.
 const WORSE_BY: f64 = 0.01;
 
 /// A usable answer: its error, its standard deviation, and the error of the declared value, each over the truth.

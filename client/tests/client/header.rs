@@ -1,5 +1,5 @@
-//! `dynocar.h` is clean C and C++, and the libraries hold the functions that it declares; its numbers and structs are
-//! generated from the library (`bindings.rs`), and the compiler checks the offset of each field.
+//! `dynocar.h` is clean C and C++, and the libraries hold the functions that it declares; its constants and structs
+//! are generated from the library (`bindings.rs`), and the compiler checks the offset of each field.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;

@@ -18,7 +18,7 @@ pub fn published_samples(dataset: &Dataset, train: TrainId) -> Vec<TrainSample> 
     samples_of_runs(&dataset.runs, train)
 }
 
-/// Returns the samples of some runs, as a controller publishes them that drove no others.
+/// Returns the samples of some runs as a controller would publish them if it had driven no other runs.
 pub fn samples_of_runs<'a>(
     runs: impl IntoIterator<Item = &'a Run>,
     train: TrainId,

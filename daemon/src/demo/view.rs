@@ -1,4 +1,4 @@
-//! The live view: one line for each pipeline, a bar for the runs; plain lines without a terminal.
+//! The live view: one line for each pipeline, a progress bar of the samples; plain lines without a terminal.
 
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
@@ -14,7 +14,7 @@ use crate::redrawn::{Redrawn, bar, can_draw};
 /// How often a plain line is written for each pipeline.
 const PLAIN_EVERY: Duration = Duration::from_secs(3);
 
-/// Letters of the bar of samples.
+/// Width of the progress bar in characters.
 const BAR_LETTERS: usize = 40;
 
 /// Shows the estimates as they come.

@@ -14,14 +14,14 @@ use super::idle::Idler;
 use super::tally::Tally;
 use crate::config::{IdleStrategy, ThreadConfig};
 
-/// Polls of a thread that finds no sample between two readings of the clock: a reading takes as long as a poll, and a
-/// sample that comes meanwhile would wait for it.
+/// Number of polls between two readings of the clock while a thread finds no sample. Reading the clock takes as long
+/// as a poll, and a sample that arrives during the reading has to wait.
 const LOOKS_PER_CLOCK: usize = 16;
 
 /// Samples that one train may take in a row before the thread's other trains have their turn.
 const TURN: usize = 64;
 
-/// Inputs of a worker's start; made by the main thread, taken into the thread.
+/// All that a worker needs to start; the main thread makes it and hands it to the worker's thread.
 pub struct WorkerPlan {
     /// Name, core and idle strategy.
     pub thread: ThreadConfig,

@@ -2,8 +2,8 @@
 //! noise), and the Cramér-Rao bound from a run's own numerical Jacobian.
 //!
 //! M = 981.7 t, γ = 0.06, traction up to min(520, 18240 / v) kN, 100 m sampling, white noise of 0.18 m/s on the speed
-//! (the paper's ε1, a mean square of 0.05 at the true coefficients, allows no more). The truth moves by eq. 7, as the
-//! paper's own data do (mean squares of 1e-9).
+//! (more is not possible: the paper's search ends at a mean square of ε1 = 0.05, which the true coefficients must
+//! reach). The truth moves by eq. 7, as the paper's own data do (mean squares of 1e-9).
 
 use dynocar_core::filter::triangular::{TriangularAccumulator, TriangularSystem};
 use dynocar_estimators::xia::trajectory::step::TrajectoryStep;

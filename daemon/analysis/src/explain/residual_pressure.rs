@@ -6,9 +6,9 @@ use crate::statistics::middle;
 
 /// Time in s in which the cylinders empty after the brake force has gone.
 const RELEASE_S: f64 = 6.0;
-/// Least lasting pressure in Pa that counts.
+/// Least rise in Pa of the pressure with a released brake that counts as lasting pressure.
 const STEP_MIN_PA: f64 = 2500.0;
-/// Least size of a step, in multiples of the scatter.
+/// Least rise, in multiples of the scatter of the pressure on either side of the step.
 const STEP_SPREADS: f64 = 4.0;
 /// Least number of released samples on either side of a step.
 const SAMPLES_MIN: usize = 20;

@@ -4,7 +4,8 @@ use super::alignment::Alignment;
 use super::recording::SAME_ALIGNMENT_M;
 use crate::statistics::share_of;
 
-/// Least share of the common part of two directions on one track that lies within `SAME_TRACK_M`.
+/// Least share of the common part of two alignments on which they lie within `SAME_TRACK_M` of each other, if they are
+/// one track.
 const SAME_TRACK_SHARE: f64 = 0.97;
 /// Greatest distance in m between the two directions' alignments where they are on one track.
 const SAME_TRACK_M: f64 = 25.0;
@@ -12,18 +13,20 @@ const SAME_TRACK_M: f64 = 25.0;
 const SAME_CHAINAGE_M: f64 = 15.0;
 /// Greatest difference between the lengths of one track as two directions measure them, as a share.
 const DRIFT_SHARE: f64 = 0.005;
-/// Additional difference for each m of the line, since the measured lengths drift unevenly.
+/// Addition to `SAME_CHAINAGE_M` for each m of the line, since the measured lengths drift unevenly.
 const UNEVEN_SHARE: f64 = 0.0005;
 /// Least difference in m between the ways there and back that shows a crossing of the line with itself.
 const CROSSING_MIN_M: f64 = 300.0;
-/// Least length in m over which each direction goes on alone at the same end, if they fork there.
+/// Length in m: where both directions go on alone for more than this at the same end, they fork there and are two
+/// tracks.
 const FORK_M: f64 = 100.0;
 
 /// Comparison of two alignments, each in its direction of travel.
 pub struct Compared {
-    /// Chainage in m along the growing alignment where the falling one starts.
+    /// Chainage in m, along the alignment of growing chainage, at which the alignment of falling chainage starts.
     pub start_chainage_m: f64,
-    /// The track of both, for growing chainage, as far as either drives it; `None` where they are two tracks.
+    /// The one track of both, in the direction of growing chainage, over all that at least one of them drives; `None`
+    /// if they are two tracks.
     pub joined: Option<Alignment>,
 }
 

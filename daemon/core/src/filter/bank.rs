@@ -11,9 +11,9 @@ use super::Gaussian;
 
 /// At most `MAX` hypotheses with the evidence for each, in the order in which they joined.
 ///
-/// The caller, who moves and measures the hypotheses, adds to their weights and lets the bank settle. A weight is the
-/// logarithm of a likelihood, of any size, or it is odds: the cheaper form where likelihoods are densities that cannot
-/// vanish.
+/// The caller moves and measures the hypotheses and updates their weights; then the bank settles: it finds the
+/// likeliest and scales the weights to it. A weight is either the logarithm of a likelihood, which may have any size,
+/// or odds, which are cheaper but only serve where the likelihoods are densities that cannot vanish.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bank<H, const MAX: usize> {
     hypotheses: ArrayVec<H, MAX>,

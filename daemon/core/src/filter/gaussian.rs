@@ -1,8 +1,9 @@
 //! A Gaussian belief about a state, in covariance form.
 //!
-//! Every filter in covariance form consists of these steps. First the whole state moves by a linearised model; where
-//! most states stay, only single ones are rewritten. Then measurements of single states are taken in, each in three
-//! parts, so that it can be judged before it counts.
+//! Every filter in covariance form consists of these steps. First the state moves: as a whole by a linearised model
+//! ([`Gaussian::predict`]) or, where most components stay, by single components ([`Gaussian::rewrite`]). Then
+//! measurements of single components are taken in: [`Gaussian::innovation`] forms the innovation, the caller judges
+//! it, and [`Gaussian::take`] updates the belief.
 
 use nalgebra::{SMatrix, SVector};
 

@@ -1,7 +1,7 @@
 //! A covariance as its lower triangular factor L, P = L Lᵀ.
 //!
-//! The factor keeps P symmetric and positive for any ratio of its entries (Bierman 1977, Factorization Methods for
-//! Discrete Sequential Estimation; Carlson 1973 for the update).
+//! The factor keeps P symmetric and positive even if its entries differ by many orders of magnitude (Bierman 1977,
+//! Factorization Methods for Discrete Sequential Estimation; Carlson 1973 for the update).
 
 use nalgebra::{SMatrix, SVector};
 

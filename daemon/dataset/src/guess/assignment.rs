@@ -1,4 +1,5 @@
-//! Assignment of columns to quantities, of forces by their signs.
+//! Assignment of columns to quantities, and its corrections by the columns' values: a position's span, the signs of
+//! forces.
 
 use std::cmp::Reverse;
 

@@ -18,13 +18,14 @@ use super::bias_bank::{BiasBank, Dynamics, MassBiasMoments, SPEED};
 use super::kalman_settings::MassKalmanSettings;
 use super::known_motion::{Inertia, KnownMotion};
 
-/// Samples over which the evidence for a behaviour of the bias is remembered.
+/// Number of samples over which the evidence for each assumed behaviour of the bias ([`super::bias_bank`]) is
+/// remembered.
 const EVIDENCE_MEMORY: f64 = 3000.0;
 /// Number of used samples below which no mass is reported, unless they reach over `MOVED_MIN_S`.
 const SAMPLES_MIN: u64 = 50;
-/// Motion in s after which few samples are enough, where a second or more lies between them.
+/// Time in s of motion after which fewer samples are enough: for slow sampling, with a second or so between samples.
 const MOVED_MIN_S: f64 = 20.0;
-/// Share by which a declared mass has to change to be followed; load weighing is not steadier.
+/// Least relative change of a declared mass that is followed; a smaller one may be scatter of the load weighing.
 const DECLARED_CHANGE_MIN: f64 = 0.02;
 
 /// Learns a train's mass while it drives or brakes.

@@ -16,7 +16,7 @@ use mcap::{Attachment, Compression, WriteOptions, Writer};
 
 const DEMO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/demo");
 
-/// Another tool, which rewrites the attachments and the first messages.
+/// Another tool: it copies the attachments and the first messages into a new file and drops the rest.
 struct Tool {
     writer: Writer<BufWriter<File>>,
     channels: HashMap<String, u16>,

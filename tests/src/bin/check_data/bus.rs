@@ -19,10 +19,12 @@ use super::stop_masses::{self, StopMasses};
 /// Largest open-loop error in m/s on trips left out, for the error over 60 s in all trips and for the median error from
 /// stop to stop.
 const ERROR_MAX_MPS: f64 = 0.30;
-/// Largest scatter in t of the mass from stop to stop, and its least correlation with the counted one.
+/// Largest scatter in t of the learned masses between stops about the masses by passenger count, and least correlation
+/// of the two.
 const STOP_MASS_T: f64 = 0.38;
 const CORRELATION: f64 = 0.9;
-/// Greatest share of the error that remains after the gradient of a line declared level is found.
+/// Limit of the error after explaining, as a share of the error before, where the line is declared level and its
+/// gradient has to be found.
 const LEVEL_SHARE_MAX: f64 = 0.25;
 /// Range of the inertial mass from independent analyses of the day.
 const INERTIAL_MASS_T: [f64; 2] = [19.4, 20.1];

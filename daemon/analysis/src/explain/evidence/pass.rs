@@ -24,7 +24,7 @@ pub(super) struct Pass<'m> {
 }
 
 impl<'m> Pass<'m> {
-    /// Of effects in the order of the model.
+    /// Returns the pass of effects that are given in the order of the model; sorts them by their turn.
     pub fn of(effects: impl Iterator<Item = (&'m SharedHypothesis, Range<usize>)>) -> Self {
         let mut order: Vec<_> = effects.collect();
         order.sort_by_key(|(effect, _)| effect.nature().turn);

@@ -6,7 +6,7 @@ use crate::explain::evidence::RunData;
 /// Shortest interval in m.
 const SHORTEST_M: f64 = 100.0;
 
-/// Axis of which an end is a value.
+/// Quantity in which the position of an end is given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
     /// Chainage in m.

@@ -4,13 +4,15 @@ use dynocar_shared::Reason;
 
 /// Mean square of normalised innovations above which they are too large.
 const MEAN_SQUARE_MAX: f64 = 2.0;
-/// Lag-1 covariance of the normalised innovations above which the model lacks something. Where the innovations are far
-/// smaller than expected, as with a perfect sensor, their likeness does not matter.
+/// Lag-1 covariance of the normalised innovations above which the model lacks something. It is the covariance and not
+/// the correlation, since correlation does not matter where the innovations are far smaller than expected, as with a
+/// perfect sensor.
 const COVARIANCE_MAX: f64 = 0.4;
-/// Long-run variance of the innovations beyond which the intervals are too narrow, however small each innovation is:
-/// noise that was learned from bad speeds hides their size, not their likeness.
+/// Long-run variance of the normalised innovations above which the intervals are too narrow, even if every innovation
+/// is small: noise that was learned from bad speeds makes the innovations small but leaves them correlated.
 pub const LONG_RUN_MAX: f64 = 4.0;
-/// Standard deviations by which a statistic must differ from its mean for white innovations.
+/// Number of standard deviations by which a statistic must exceed the mean that it has for white innovations, before
+/// the excess is more than chance.
 const CHANCE_DEVIATIONS: f64 = 4.0;
 
 /// Returns whether a mean square says that innovations are larger than the covariance predicts.

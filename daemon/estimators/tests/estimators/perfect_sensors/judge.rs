@@ -7,11 +7,12 @@ use dynocar_shared::{Parameter, ParameterSnapshot, Status, TrainId, TrainSample}
 
 use super::drive::{DAVIS, FRICTION, MASS_KG, Phase, train};
 
-/// Standard deviations within which a trusted value must lie, unless it is this close as a share.
+/// Number of standard deviations within which a trusted value must lie, unless its relative error is at most
+/// `SHARE_MAX`.
 const STDS_MAX: f64 = 4.0;
 const SHARE_MAX: f64 = 0.05;
 
-/// Estimates of a run.
+/// Counts of a drive's snapshots: all, those called `estimated`, and the wrong ones of these.
 #[derive(Clone, Debug, Default)]
 pub struct Found {
     pub looks: u64,

@@ -1,4 +1,4 @@
-//! The plots, as SVG text for the page.
+//! The plots of the report page, as SVG text.
 //!
 //! # Layout
 //!
