@@ -4,13 +4,9 @@ use std::time::{Duration, Instant};
 
 use dynocar_shared::{TrainId, TrainSample};
 
-use dynocar_transport::Host;
-use dynocar_transport::Role;
-use dynocar_transport::channel::Owner;
-use dynocar_transport::channel::{SampleCount, Sender, Transport, Waker};
-use dynocar_transport::monotonic_now_ns;
+use dynocar_transport::channel::{Owner, SampleCount, Sender, Transport, Waker};
 use dynocar_transport::peer::{Peer, RoleLock};
-use dynocar_transport::{ChannelError, SendRefused};
+use dynocar_transport::{ChannelError, Host, Role, SendRefused, monotonic_now_ns};
 
 /// Time for which a publisher that is closed waits for the pipelines to take the samples on their way.
 pub const CLOSE_PATIENCE: Duration = Duration::from_millis(200);

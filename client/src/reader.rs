@@ -7,12 +7,8 @@ use dynocar_shared::{
     ParameterSnapshot, PipelineKind, Quantity, Reason, Status, TrainId, UseState,
 };
 
-use dynocar_transport::ChannelError;
-use dynocar_transport::Host;
-use dynocar_transport::Peer;
-use dynocar_transport::Role;
 use dynocar_transport::channel::{Receiver, Transport};
-use dynocar_transport::monotonic_now_ns;
+use dynocar_transport::{ChannelError, Host, Peer, Role, monotonic_now_ns};
 
 /// A snapshot older than this counts as stale, in ns. The daemon republishes every 50 ms.
 pub const STALE_AFTER_NS: i64 = 250_000_000;

@@ -2,9 +2,8 @@
 
 use dynocar_analysis::dataset::{Dataset, parse_track, parse_train};
 use dynocar_analysis::explain::effects::{Candidate, LIBRARY, On, Past, UNKNOWN};
-use dynocar_analysis::explain::evidence::prepare;
 use dynocar_analysis::explain::evidence::{
-    Fit, FitProblem, Noise, RunData, SampleForces, UpdatedForces, UpdatedModel,
+    Fit, FitProblem, Noise, RunData, SampleForces, UpdatedForces, UpdatedModel, prepare,
 };
 use dynocar_analysis::explain::scan::Scan;
 use dynocar_model::terms::wheel;

@@ -15,9 +15,8 @@ use super::traffic::{LoopTraffic, TrafficPlan};
 use super::wire::{BenchTransport, Client, Notifying};
 use crate::output::{BenchError, during};
 use crate::rig::cores::{Cores, bind, prioritise};
-use crate::rig::pipelines;
 use crate::rig::site::{DaemonPlan, ThreadPlan, peer, put_candidates, require, site, stop};
-use crate::rig::usage;
+use crate::rig::{pipelines, usage};
 
 /// The answering side.
 #[derive(Clone, Debug, PartialEq, Eq)]

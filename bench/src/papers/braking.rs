@@ -5,8 +5,7 @@
 //! 0.1 m and 0.1 km/h. The papers leave out the Davis coefficients, the number of pads and the
 //! sampling time; those here reproduce their stopping distances.
 
-use dynocar_core::pipeline::braking::intake::BrakingCoefficient;
-use dynocar_core::pipeline::braking::intake::DeclaredGear;
+use dynocar_core::pipeline::braking::intake::{BrakingCoefficient, DeclaredGear};
 use dynocar_core::pipeline::braking::settings::WalkSettings;
 use dynocar_model::train::{BrakeGear, Davis, TrainModel};
 use dynocar_shared::RailCondition;

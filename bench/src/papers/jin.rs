@@ -1,7 +1,6 @@
 //! Jin 2020: disc friction and braking ratio of a braking train.
 
-use dynocar_core::pipeline::braking::intake::BrakingCoefficient;
-use dynocar_core::pipeline::braking::intake::DeclaredGear;
+use dynocar_core::pipeline::braking::intake::{BrakingCoefficient, DeclaredGear};
 use dynocar_shared::{EffortPoint, Stop};
 
 use super::braking::{JIN_TABLE_3, JIN_TABLE_4, PRESSURE_PA, declared, disc_friction, train};

@@ -1,7 +1,6 @@
 //! Xie 2019: wheel-rail adhesion of a braking train.
 
-use dynocar_core::pipeline::braking::intake::BrakingCoefficient;
-use dynocar_core::pipeline::braking::intake::DeclaredGear;
+use dynocar_core::pipeline::braking::intake::{BrakingCoefficient, DeclaredGear};
 use dynocar_core::pipeline::braking::settings::LawSettings;
 use dynocar_estimators::xie::{EStep, EmSettings};
 use dynocar_model::train::TrainModel;

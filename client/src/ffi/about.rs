@@ -11,10 +11,7 @@ use dynocar_shared::{
 };
 
 use super::error::{Code, Failure, Message, guard_in_words};
-use dynocar_transport::ChannelError;
-use dynocar_transport::Host;
-use dynocar_transport::Peer;
-use dynocar_transport::Role;
+use dynocar_transport::{ChannelError, Host, Peer, Role};
 
 vocabulary! {
     /// Who serves a train; `DYNOCAR_DAEMON_…` in C.

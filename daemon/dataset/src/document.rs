@@ -6,8 +6,7 @@ use dynocar_model::train::NumberRule;
 use dynocar_model::units::Unit;
 use toml::value::Datetime;
 
-use super::error::unknown;
-use super::error::{DatasetError, SourcePosition};
+use super::error::{DatasetError, SourcePosition, unknown};
 use super::node::{Node, NodeContent};
 
 /// Returns the names of the tables and keys at the top of a TOML file, in the order of the file.

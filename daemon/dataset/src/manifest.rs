@@ -7,16 +7,14 @@ use dynocar_model::units::Unit;
 
 use super::clock::{self, TimeFormat};
 use super::document::Item;
-use super::error::unknown;
-use super::error::{DatasetError, SourcePosition};
+use super::error::{DatasetError, SourcePosition, unknown};
 use super::keys::column::{COLUMN, DOUBTFUL, FORMAT, OFFSET, SCALE, UNIT};
 use super::keys::dataset::{DESCRIPTION, NAME, POSITION_REFERENCE};
 use super::keys::run::{DATE, DIRECTION, FILE, MASS, ROLE, START};
 use super::keys::{self, DATASET_TABLES, FileKey, allow};
 use super::node::Node;
 use super::quantity::Quantity;
-use super::text_layout::TextLayout;
-use super::text_layout::TrainRows;
+use super::text_layout::{TextLayout, TrainRows};
 
 named! {
     /// Point of the train to which recorded positions refer.

@@ -14,8 +14,7 @@ use super::error::{DatasetError, SourcePosition};
 
 use super::forces::{self, ForceSource};
 use super::manifest::{Manifest, Role, RunEntry};
-use super::quality::Judge;
-use super::quality::{self, RunQuality};
+use super::quality::{self, Judge, RunQuality};
 use super::quantity::Quantity;
 use super::resolved::{Context, GradientSource, Resolved};
 use super::run_content::{RunColumns, RunContent};

@@ -22,8 +22,7 @@ use crate::wang::{
     JointLeastSquares, JointLeastSquaresSettings, MassKalman, MassKalmanSettings, StagedDescent,
     StagedDescentSettings,
 };
-use crate::xia::newton::TrajectoryNewton;
-use crate::xia::newton::TrajectoryNewtonSettings;
+use crate::xia::newton::{TrajectoryNewton, TrajectoryNewtonSettings};
 use crate::xia::trajectory::kalman::TrajectoryKalmanSettings;
 use crate::xie::EmSettings;
 

@@ -13,8 +13,7 @@ use dynocar::programs::{RECORDING, called_as};
 
 use super::page::page;
 use super::record::{KeepError, RecordError};
-use dynocar_mcap::copying::read_all;
-use dynocar_mcap::copying::recover;
+use dynocar_mcap::copying::{read_all, recover};
 use dynocar_mcap::reading::FileEnding;
 
 pub use record::WantedArguments;

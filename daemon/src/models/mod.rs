@@ -36,7 +36,6 @@ pub use decision::{Action, Decision, NewDecision};
 pub use error::ModelsError;
 pub use history::{ModelHistory, State};
 pub use moment::UtcSecond;
-pub use origin::MaintenanceEvent;
-pub use origin::{FoundEffect, ModelFigure, Origin};
+pub use origin::{FoundEffect, MaintenanceEvent, ModelFigure, Origin};
 pub use store::{Listing, NewModel, Store, Stored, TrainModels};
 pub use text::{ModelHash, ModelText};

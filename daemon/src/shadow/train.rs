@@ -13,8 +13,7 @@ use dynocar_shared::TrainSample;
 use tracing::{info, warn};
 
 use super::in_force::{self, with_model};
-use super::record::TrialFigures;
-use super::record::{self, RivalEstimate, TriedModel, ratio_in_words};
+use super::record::{self, RivalEstimate, TrialFigures, TriedModel, ratio_in_words};
 use super::rule::{Adopt, ModelStanding, Rule, standing};
 use crate::config::{ModelsConfig, PipelineConfig, TrainConfig};
 use crate::models::{ModelHash, ModelsError, NewDecision, TrainModels, UtcSecond};

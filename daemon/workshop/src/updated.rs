@@ -20,8 +20,7 @@ use dynocar_analysis::explain::evidence::Fit;
 use dynocar_model::train::numbers::{AUXILIARY_POWER, DAVIS_A, DAVIS_B, DAVIS_C, DRIVE_EFFICIENCY};
 use toml::Table;
 
-use super::dataset::from_folder;
-use super::dataset::{FilesOfDataset, open};
+use super::dataset::{FilesOfDataset, from_folder, open};
 
 /// The files of an updated model: the train, the line where something is known of it, and the dataset.
 pub const UPDATED_FILES: [&str; 3] = [TRAIN_FILE, TRACK_FILE, MANIFEST_FILE];

@@ -2,11 +2,11 @@
 //! features, one step a sample, learning rate 1e-7).
 
 use dynocar_core::pipeline::Estimator;
-use dynocar_estimators::wang::known_motion::KnownMotion;
-use dynocar_estimators::wang::known_motion::LearningSet;
+use dynocar_estimators::wang::known_motion::{KnownMotion, LearningSet};
 use dynocar_estimators::wang::line_resistance::LineResistance;
-use dynocar_estimators::wang::{JointLeastSquares, JointLeastSquaresSettings};
-use dynocar_estimators::wang::{StagedDescent, StagedDescentSettings};
+use dynocar_estimators::wang::{
+    JointLeastSquares, JointLeastSquaresSettings, StagedDescent, StagedDescentSettings,
+};
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;

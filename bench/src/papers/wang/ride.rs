@@ -4,8 +4,9 @@
 use dynocar_core::pipeline::Outcome;
 use dynocar_core::pipeline::admission::Admission;
 use dynocar_estimators::wang::line_resistance::LineResistance;
-use dynocar_estimators::wang::{MassKalman, MassKalmanSettings};
-use dynocar_estimators::wang::{MassRegression, StagedDescent, StagedDescentSettings};
+use dynocar_estimators::wang::{
+    MassKalman, MassKalmanSettings, MassRegression, StagedDescent, StagedDescentSettings,
+};
 use dynocar_model::force::ResolvedSample;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainId, TrainSample};

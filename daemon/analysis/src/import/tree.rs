@@ -2,9 +2,8 @@
 
 use granit_parser::{Event, Parser, ScalarStyle};
 
-use crate::dataset::DatasetError;
-use crate::dataset::SourcePosition;
 use crate::dataset::node::{Node, NodeContent};
+use crate::dataset::{DatasetError, SourcePosition};
 
 /// Greatest depth of nesting: no format is deeper, and a file that is would use up the stack.
 const DEPTH_MAX: usize = 64;

@@ -9,10 +9,9 @@ use dynocar_model::train::{Davis, TrainModel};
 use dynocar_model::units::{Dimension, Unit};
 
 use super::imported::{Account, ImportedLine, ImportedTrain};
-use crate::dataset::DatasetError;
 use crate::dataset::document::{Item, above_zero};
-use crate::dataset::keys;
 use crate::dataset::keys::track::{GRADIENT, PERMITTED_SPEED};
+use crate::dataset::{DatasetError, keys};
 
 /// Returns the unit named under a key of a map, by the field's spelling of it.
 pub(super) fn unit(item: &Item, key: &str, dimension: Dimension) -> Result<Unit, DatasetError> {

@@ -5,8 +5,7 @@ use super::name::Name;
 use crate::cell::{is_missing, parse_cell, ungrouped};
 use crate::error::{DatasetError, NO_HEADER, NO_ROWS, SourcePosition};
 use crate::lines::{self, RowReader};
-use crate::text_layout::Marks;
-use crate::text_layout::THOUSANDS;
+use crate::text_layout::{Marks, THOUSANDS};
 use crate::{TextLayout, TimeFormat};
 
 /// Possible separators of cells, in the order of preference.

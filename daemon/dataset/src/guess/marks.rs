@@ -2,8 +2,7 @@
 
 use crate::cell::{is_word, ungrouped};
 use crate::lines::{CellRow, RowReader};
-use crate::text_layout::Marks;
-use crate::text_layout::THOUSANDS;
+use crate::text_layout::{Marks, THOUSANDS};
 
 /// Evidence of the cells of files on their marks.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -23,10 +23,8 @@ pub fn carried_n(brake_n: f64, adhesion: f64, weight_n: f64) -> f64 {
 
 /// Unit: the share of the brake force that is missing.
 pub const SUSPECT: Suspect = Suspect {
-    effect: EffectKind::LowAdhesion,
-    prior_std: 0.2,
     is_positive: true,
     least: Least::Size(0.04),
     changes_at_stops: true,
-    unit: |seen| -seen.brake,
+    ..Suspect::new(EffectKind::LowAdhesion, 0.2, |seen| -seen.brake)
 };

@@ -34,14 +34,10 @@ pub fn act(w0_per_k: f64, reference_k: f64, degc: Option<f64>, resistance: &mut 
 
 /// Unit: the share of w0 added for 10 K more.
 pub const SUSPECT: Suspect = Suspect {
-    effect: EffectKind::AmbientTemperature,
-    prior_std: 0.1,
-    is_positive: false,
     least: Least::Share(0.7),
-    changes_at_stops: false,
-    unit: |seen| {
+    ..Suspect::new(EffectKind::AmbientTemperature, 0.1, |seen| {
         let mut warm = Resistance::BASIC;
         act(0.1, REFERENCE_K, seen.ambient_temperature_degc, &mut warm);
         warm.extra_n_per_kn(seen.davis, seen.speed_mps)
-    },
+    })
 };

@@ -6,7 +6,7 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Least, Parameter, Resistance, Suspect};
+use super::{Parameter, Resistance, Suspect};
 pub use crate::train::numbers::{BEARING_DELTA_A as DELTA_A, BEARING_TAU as TAU};
 
 /// Delta and tau.
@@ -49,16 +49,12 @@ pub fn act(delta_a_n_per_kn: f64, tau_s: f64, since_cold_s: f64, resistance: &mu
 
 /// Unit: the declared a, added at a cold start.
 pub const SUSPECT: Suspect = Suspect {
-    effect: EffectKind::BearingTemperature,
-    prior_std: 1.0,
     is_positive: true,
-    least: Least::Share(1.0),
-    changes_at_stops: false,
-    unit: |seen| {
+    ..Suspect::new(EffectKind::BearingTemperature, 1.0, |seen| {
         let mut cold = Resistance::BASIC;
         act(seen.davis.a, TYPICAL_TAU_S, seen.since_cold_s, &mut cold);
         cold.bearing_n_per_kn
-    },
+    })
 };
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Least, Parameter, Suspect, adhesion};
+use super::{Parameter, Suspect, adhesion};
 pub use crate::train::numbers::BRAKE_GAIN as GAIN;
 
 /// A brake whose force is nearer to its report is as good as declared.
@@ -21,11 +21,5 @@ pub fn build_up(since_s: f64) -> f64 {
 }
 
 /// Unit: 1 N/kN.
-pub const SUSPECT: Suspect = Suspect {
-    effect: EffectKind::DraggingBrake,
-    prior_std: 1.5,
-    is_positive: true,
-    least: Least::Share(1.0),
-    changes_at_stops: false,
-    unit: |_| 1.0,
-};
+pub const SUSPECT: Suspect =
+    Suspect { is_positive: true, ..Suspect::new(EffectKind::DraggingBrake, 1.5, |_| 1.0) };

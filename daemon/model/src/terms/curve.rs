@@ -2,7 +2,7 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Least, Parameter, Resistance, Suspect};
+use super::{Parameter, Resistance, Suspect};
 pub use crate::train::numbers::CURVE_CONSTANT as CONSTANT;
 
 /// The total k lies between 0 and about eight times the usual value.
@@ -20,15 +20,8 @@ pub fn act(k_n_per_kn_m: f64, curvature_per_m: Option<f64>, resistance: &mut Res
 }
 
 /// Unit: 1000 N/kN m of k.
-pub const SUSPECT: Suspect = Suspect {
-    effect: EffectKind::CurveResistance,
-    prior_std: 0.7,
-    is_positive: false,
-    least: Least::Share(1.0),
-    changes_at_stops: false,
-    unit: |seen| {
-        let mut curves = Resistance::BASIC;
-        act(1000.0, seen.curvature_per_m, &mut curves);
-        curves.curve_n_per_kn
-    },
-};
+pub const SUSPECT: Suspect = Suspect::new(EffectKind::CurveResistance, 0.7, |seen| {
+    let mut curves = Resistance::BASIC;
+    act(1000.0, seen.curvature_per_m, &mut curves);
+    curves.curve_n_per_kn
+});

@@ -3,7 +3,7 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Least, Parameter, Suspect};
+use super::{Parameter, Suspect};
 use crate::track::{GradientError, Track};
 
 /// The number of `[track]` by which the true profile is shifted against the map, towards growing chainage.
@@ -50,10 +50,6 @@ pub fn along_travel_permille(
 
 /// Unit: the error of the gradient that was found at the same place in earlier passes.
 pub const SUSPECT: Suspect = Suspect {
-    effect: EffectKind::GradientError,
-    prior_std: 1.0,
     is_positive: true,
-    least: Least::Share(1.0),
-    changes_at_stops: false,
-    unit: |seen| seen.earlier_uphill,
+    ..Suspect::new(EffectKind::GradientError, 1.0, |seen| seen.earlier_uphill)
 };

@@ -95,3 +95,12 @@ pub struct Suspect {
     /// The retarding force in N/kN of one unit.
     pub unit: fn(&SuspectInput) -> f64,
 }
+
+impl Suspect {
+    /// Returns an effect of either sign that stays through stops and is worth naming from the monitor's own share of the
+    /// resistance on.
+    pub const fn new(effect: EffectKind, prior_std: f64, unit: fn(&SuspectInput) -> f64) -> Self {
+        let least = Least::Share(1.0);
+        Suspect { effect, prior_std, is_positive: false, least, changes_at_stops: false, unit }
+    }
+}

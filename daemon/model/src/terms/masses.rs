@@ -16,10 +16,7 @@ pub const WEIGHED_STD: f64 = 0.03;
 
 /// Unit: the share of the mass that is added.
 pub const SUSPECT: Suspect = Suspect {
-    effect: EffectKind::MassChange,
-    prior_std: 0.1,
-    is_positive: false,
     least: Least::Size(0.025),
     changes_at_stops: true,
-    unit: |seen| seen.traction - seen.brake,
+    ..Suspect::new(EffectKind::MassChange, 0.1, |seen| seen.traction - seen.brake)
 };

@@ -2,7 +2,7 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Least, Parameter, Resistance, Suspect};
+use super::{Parameter, Resistance, Suspect};
 pub use crate::track::RESISTANCE as LIST;
 use crate::track::{IntervalValue, StepProfile, TrackError, interval_profile};
 
@@ -28,10 +28,6 @@ pub fn act(extra_n_per_kn: f64, resistance: &mut Resistance) {
 
 /// Unit: the force that was found at the same place in earlier passes.
 pub const SUSPECT: Suspect = Suspect {
-    effect: EffectKind::LocalResistance,
-    prior_std: 1.0,
     is_positive: true,
-    least: Least::Share(1.0),
-    changes_at_stops: false,
-    unit: |seen| seen.earlier,
+    ..Suspect::new(EffectKind::LocalResistance, 1.0, |seen| seen.earlier)
 };

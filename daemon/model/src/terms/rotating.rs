@@ -20,10 +20,8 @@ pub fn inertial_mass_kg(mass_kg: f64, factor: f64) -> f64 {
 
 /// The monitor's suspect; its unit is an addition to gamma.
 pub const SUSPECT: Suspect = Suspect {
-    effect: EffectKind::RotatingMass,
-    prior_std: 0.05,
-    is_positive: false,
     least: Least::Size(0.02),
-    changes_at_stops: false,
-    unit: |seen| seen.driving - seen.davis.w0_n_per_kn(seen.speed_mps),
+    ..Suspect::new(EffectKind::RotatingMass, 0.05, |seen| {
+        seen.driving - seen.davis.w0_n_per_kn(seen.speed_mps)
+    })
 };

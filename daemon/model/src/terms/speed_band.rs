@@ -6,7 +6,7 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Least, Suspect, SuspectInput};
+use super::{Suspect, SuspectInput};
 
 /// Speed in m/s from the middle of a band to the middle of its neighbour, where the band ends.
 const WIDTH_MPS: f64 = 7.5;
@@ -19,14 +19,7 @@ fn share(band: usize, speed_mps: f64) -> f64 {
 
 /// A suspect whose unit is 1 N/kN in a band.
 const fn of(unit: fn(&SuspectInput) -> f64) -> Suspect {
-    Suspect {
-        effect: EffectKind::Unknown,
-        prior_std: 1.0,
-        is_positive: false,
-        least: Least::Share(1.0),
-        changes_at_stops: false,
-        unit,
-    }
+    Suspect::new(EffectKind::Unknown, 1.0, unit)
 }
 
 /// From standing to fast.

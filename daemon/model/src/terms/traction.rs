@@ -21,10 +21,6 @@ pub fn true_force_n(reported_n: f64, gain: f64) -> f64 {
 
 /// Unit: the share of the traction force that is missing.
 pub const SUSPECT: Suspect = Suspect {
-    effect: EffectKind::TractionGain,
-    prior_std: 0.06,
-    is_positive: false,
     least: Least::Size(0.02),
-    changes_at_stops: false,
-    unit: |seen| seen.traction,
+    ..Suspect::new(EffectKind::TractionGain, 0.06, |seen| seen.traction)
 };

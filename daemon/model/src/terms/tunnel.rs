@@ -3,7 +3,7 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Least, Parameter, Resistance, Suspect};
+use super::{Parameter, Resistance, Suspect};
 pub use crate::train::numbers::{
     TUNNEL_C_FACTOR as C_FACTOR, TUNNEL_CONSTANT as CONSTANT, TUNNEL_DC as DC,
 };
@@ -40,14 +40,10 @@ pub fn act(dc_n_per_kn_per_mps2: f64, share: Option<f64>, resistance: &mut Resis
 
 /// Unit: the share of c v² that is added inside.
 pub const SUSPECT: Suspect = Suspect {
-    effect: EffectKind::TunnelDrag,
-    prior_std: 1.0,
     is_positive: true,
-    least: Least::Share(1.0),
-    changes_at_stops: false,
-    unit: |seen| {
+    ..Suspect::new(EffectKind::TunnelDrag, 1.0, |seen| {
         let mut inside = Resistance::BASIC;
         act_by_factor(2.0, seen.tunnel_share, &mut inside);
         inside.extra_n_per_kn(seen.davis, seen.speed_mps)
-    },
+    })
 };

@@ -3,7 +3,7 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Least, Parameter, Resistance, Suspect, SuspectInput};
+use super::{Parameter, Resistance, Suspect, SuspectInput};
 pub use crate::train::numbers::WIND_PLUS;
 
 /// Faster wind stops rail traffic.
@@ -31,14 +31,7 @@ pub fn slope_n_per_kn(c: f64, speed_mps: f64, tunnel_share: f64) -> f64 {
 }
 
 /// Unit: 1 m/s, as far as a little wind acts in proportion to its speed.
-pub const SUSPECT: Suspect = Suspect {
-    effect: EffectKind::Wind,
-    prior_std: 5.0,
-    is_positive: false,
-    least: Least::Share(1.0),
-    changes_at_stops: false,
-    unit: |seen| unit(seen, seen.direction),
-};
+pub const SUSPECT: Suspect = Suspect::new(EffectKind::Wind, 5.0, |seen| unit(seen, seen.direction));
 
 /// The wind of one day: a headwind in one run, in either direction of travel.
 pub const OF_THE_DAY: Suspect = Suspect { unit: |seen| unit(seen, 1.0), ..SUSPECT };

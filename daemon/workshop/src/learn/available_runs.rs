@@ -10,9 +10,8 @@ use dynocar_shared::TrainId;
 use sha2::{Digest, Sha256};
 use tracing::warn;
 
-use super::LearnError;
 use super::memory::{KnownFile, LearnerMemory};
-use super::recordings;
+use super::{LearnError, recordings};
 use crate::report::provenance::hex;
 use dynocar::dataset::read_text;
 use dynocar::models::UtcSecond;

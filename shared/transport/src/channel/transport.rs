@@ -8,8 +8,7 @@ use iceoryx2::prelude::{
 };
 
 use super::ports::{Ends, Receiver, Sender};
-use super::service::Entrance;
-use super::service::Held;
+use super::service::{Entrance, Held};
 use super::users::Users;
 use crate::error::ChannelError;
 use crate::host::Host;

@@ -14,8 +14,7 @@ use super::kalman::TrajectoryKalmanSettings;
 use super::motion::tests::sample;
 use super::test_runs::{METRO, metro, normal, random};
 use crate::EstimatorSettings;
-use crate::xia::newton::TrajectoryNewton;
-use crate::xia::newton::{FitMethod, TrajectoryNewtonSettings};
+use crate::xia::newton::{FitMethod, TrajectoryNewton, TrajectoryNewtonSettings};
 
 /// Returns the metro as declared: every coefficient is wrong by a fifth.
 fn train() -> Arc<TrainModel> {

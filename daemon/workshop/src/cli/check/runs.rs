@@ -8,8 +8,7 @@ use dynocar_analysis::dataset::{
 };
 use dynocar_core::plausibility::InputFault;
 
-use crate::run_facts::moment;
-use crate::run_facts::{self, mass_t, recorded, recorded_in_words};
+use crate::run_facts::{self, mass_t, moment, recorded, recorded_in_words};
 use dynocar::cli::text::{TextTable, WIDTH, short, wrap};
 
 type Read = Result<Run, DatasetError>;

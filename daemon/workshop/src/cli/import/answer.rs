@@ -13,8 +13,9 @@ use dynocar_model::train::numbers::{
 };
 use toml::Value;
 
-use crate::cli::train_text::{TrainArguments, TrainText, TrainValues, converted};
-use crate::cli::train_text::{comment, on_one_line};
+use crate::cli::train_text::{
+    TrainArguments, TrainText, TrainValues, comment, converted, on_one_line,
+};
 use crate::report::provenance::for_shell;
 use crate::run_facts::diagnostics;
 use dynocar::cli::text::{TextTable, entry};

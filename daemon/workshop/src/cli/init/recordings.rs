@@ -7,8 +7,7 @@ use dynocar::cli::Failure;
 use dynocar::dataset::is_parquet_path;
 use dynocar::text_file::{read_beginning, read_bytes};
 use dynocar_analysis::dataset::guess::layout;
-use dynocar_analysis::dataset::text_layout::TrainRows;
-use dynocar_analysis::dataset::text_layout::{decoded, guessed};
+use dynocar_analysis::dataset::text_layout::{TrainRows, decoded, guessed};
 use dynocar_analysis::dataset::trains::{TrainsColumn, only};
 use dynocar_analysis::dataset::{
     ColumnMapping, DatasetError, DatasetFiles, DatasetHead, FileProblem, Run, RunColumns,

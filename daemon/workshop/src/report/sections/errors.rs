@@ -4,8 +4,7 @@ use dynocar_analysis::dataset::Role;
 use dynocar_analysis::explain::report::IntervalEstimate;
 use dynocar_analysis::explain::report::errors::{ErrorPair, Resampling, RunErrors};
 use dynocar_analysis::explain::report::timeline::Trace;
-use dynocar_analysis::explain::stop_to_stop::Judged;
-use dynocar_analysis::explain::stop_to_stop::{StopToStop, reduction};
+use dynocar_analysis::explain::stop_to_stop::{Judged, StopToStop, reduction};
 
 use super::PageSection;
 use crate::report::Subject;

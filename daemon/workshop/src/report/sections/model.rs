@@ -3,8 +3,7 @@
 use dynocar_analysis::explain::evidence::SCORE_MIN;
 use dynocar_analysis::explain::identifiability::not_held;
 use dynocar_analysis::explain::report::candidates::CandidateRow;
-use dynocar_analysis::explain::report::parameters::ParameterRow;
-use dynocar_analysis::explain::report::parameters::{PlaceRow, PlaceRuns};
+use dynocar_analysis::explain::report::parameters::{ParameterRow, PlaceRow, PlaceRuns};
 use dynocar_model::words::{joined, number};
 
 use super::PageSection;
