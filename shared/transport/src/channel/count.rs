@@ -20,7 +20,7 @@ use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
 use super::users::{COUNT_SUFFIX as SUFFIX, Users, full};
 use super::wire::Payload;
 use crate::error::ChannelError;
-use crate::host::Host;
+use crate::host::{Host, unusable};
 use crate::identity::SHARED_MEMORY;
 
 /// Pipeline threads that a page has room for: as many as can receive a train's samples.
@@ -87,7 +87,7 @@ impl SampleCount {
         let path = Path::new(SHARED_MEMORY).join(name);
         let page = map(&path).map_err(|source| match source.raw_os_error() {
             Some(code) if code == Errno::NOSPC.raw_os_error() => full(0, BYTES as u64),
-            _ => ChannelError::Directory { path, action: "mapping", source },
+            _ => unusable(&path, "mapping")(source),
         })?;
         Ok(SampleCount { page, _users: users })
     }
