@@ -228,6 +228,36 @@ fn a_public_type_has_a_name_of_its_own_in_the_workspace() {
     assert!(found.is_empty(), "{found:#?}");
 }
 
+/// Returns the sentences of a line of code that hold a name of the code: a literal of four words or more, without its
+/// slots.
+fn names_in_sentences(line: &str) -> Vec<&str> {
+    let literals = line.split('"').skip(1).step_by(2);
+    let holds_a_name = |literal: &&str| {
+        let outside_slots = literal.split('{').map(|it| it.split_once('}').map_or(it, |it| it.1));
+        literal.split_whitespace().count() > 3
+            && outside_slots.into_iter().any(|it| it.contains('_'))
+    };
+    literals.filter(holds_a_name).collect()
+}
+
+#[test]
+fn sentences_of_an_explanation_hold_no_name_of_the_code() {
+    let mut found = Vec::new();
+    for path in rust_files("daemon/analysis").into_iter().filter(|it| !is_of_tests(it)) {
+        if path.components().any(|it| it.as_os_str() == "explain") {
+            let text = std::fs::read_to_string(&path).expect("a source file");
+            for line in without_tests(&text) {
+                let is_comment = line.trim_start().starts_with("//");
+                let names = if is_comment { Vec::new() } else { names_in_sentences(line) };
+                found.extend(names.into_iter().map(|it| format!("{}: {it}", path.display())));
+            }
+        }
+    }
+    assert!(found.is_empty(), "{found:#?}");
+    assert_eq!(names_in_sentences("format!(\"adds nothing given_found {found}\")").len(), 1);
+    assert!(names_in_sentences("format!(\"adds nothing beside {found_kinds}, or {}\")").is_empty());
+}
+
 #[test]
 fn riddles_and_tuples_are_found_wherever_they_stand() {
     assert_eq!(

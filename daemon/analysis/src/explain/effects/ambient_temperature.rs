@@ -34,7 +34,7 @@ pub const POLICY: Policy = Policy { certainty: Certainty::WithNuisance, ..Policy
 pub fn propose(scan: &Scan) -> Proposal {
     let means: Option<Vec<f64>> = scan.problem.runs.iter().map(mean_degc).collect();
     let Some(means) = means else {
-        return Err("ambient_temperature is not recorded in every run".into());
+        return Err("the outside temperature is not recorded in every run".into());
     };
     let spread_k = span(means.into_iter()).map_or(0.0, |[low, high]| high - low);
     if spread_k < SPREAD_MIN_K {

@@ -91,7 +91,7 @@ fn reason(explanation: &Explanation, row: &CandidateRow, is_rival: bool) -> Stri
     }
     match row.given_found {
         Some(given_found) if alone > SCORE_MIN && given_found <= SCORE_MIN => {
-            format!("borrows from the same residual: adds nothing given_found {found}")
+            format!("borrows from the same residual: adds nothing beside {found}")
         }
         _ => considered(),
     }
