@@ -14,9 +14,8 @@ use nalgebra::DMatrix;
 
 use super::answer::{DriveAnswer, WithStd};
 use super::effects::{AtBound, Hypothesis, Nature, On};
-use super::evidence::{FitProblem, RunData, RunDataError, SampleForces, UpdatedModel, prepare};
+use super::evidence::{FitProblem, RunData, SampleForces, UpdatedModel};
 use super::selection::{FORM_SHARE, OBSERVATIONS_MIN, deviations};
-use crate::dataset::{Dataset, Role};
 use crate::statistics::{rms, share_of};
 
 /// Efficiency, and the power in kW that auxiliaries take while the train drives, above their power at rest.
@@ -156,39 +155,19 @@ pub struct EstimatedDrive {
     pub answer: DriveAnswer,
 }
 
-/// Returns the drive's efficiency as estimated from the fit runs of a dataset that records its power; `None` where
-/// no force comes from power, or too little is driven to estimate it.
-///
-/// # Errors
-///
-/// When a run has no usable sample.
-pub fn estimated(dataset: &Dataset) -> Result<Option<EstimatedDrive>, RunDataError> {
-    if dataset.runs.iter().all(|run| run.power().is_none()) {
-        return Ok(None);
-    }
-    let mut runs = prepare(dataset)?;
-    runs.retain(|run| run.role == Role::Fit);
-    let powered: Vec<&RunData> = runs.iter().filter(|run| run.power.is_some()).collect();
+/// Returns the efficiency of a train's drive, which may be declared, as estimated from runs that record its power;
+/// `None` where no force comes from power, or too little is driven to estimate it.
+pub fn estimated(problem: &FitProblem, declared: Option<PowerTrain>) -> Option<EstimatedDrive> {
+    let powered: Vec<&RunData> = problem.runs.iter().filter(|run| run.power.is_some()).collect();
     if powered.is_empty() {
-        return Ok(None);
+        return None;
     }
-    let declared = dataset.train.drive;
     let drive = declared.unwrap_or(PowerTrain::USUAL);
     let holds_more = |run: &&RunData| run.power.as_ref().is_some_and(|it| it.has_auxiliaries);
     let resting = powered.iter().any(holds_more).then(|| Auxiliaries::new(&powered, drive));
-    let open = OpenDrive::new(drive, resting);
-    let problem = FitProblem::new(runs, dataset.train.resistance);
-    Ok(reported_by(&problem, open, declared))
-}
-
-fn reported_by(
-    problem: &FitProblem,
-    open: OpenDrive,
-    declared: Option<PowerTrain>,
-) -> Option<EstimatedDrive> {
-    let (start, open) = (open.start(), Arc::new(open));
+    let open = Arc::new(OpenDrive::new(drive, resting));
     let model = UpdatedModel::default().with(open.clone());
-    let fit = problem.fit_from_declared(&model, &start);
+    let fit = problem.fit_from_declared(&model, &open.start());
     if fit.observations() < OBSERVATIONS_MIN {
         return None;
     }

@@ -7,15 +7,14 @@ use std::sync::Arc;
 
 use dynocar_model::terms::Parameter;
 
-use crate::dataset::{is_stamped_late, stamped_late};
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::answer::WithStd;
 use super::effects::{Hypothesis, Nature, On};
-use super::evidence::{FitProblem, RunDataError, SampleForces, UpdatedModel, prepare};
+use super::evidence::{FitProblem, SampleForces, UpdatedModel};
 use super::selection::{OBSERVATIONS_MIN, deviations};
-use crate::dataset::{Dataset, Role};
+use crate::dataset::{is_stamped_late, stamped_late};
 
 /// Where the samples are nearer in time than this in s, a late stamp is left to each run's own small delay.
 const STEP_MIN_S: f64 = 0.5;
@@ -48,30 +47,24 @@ impl Hypothesis for LateStamps {
     }
 }
 
-/// By how many s the fit runs of a dataset stamp forces late; `None` where samples are dense, where
-/// they act after their stamps, or where it is not identifiable.
-///
-/// # Errors
-///
-/// When a run has no usable sample.
-pub fn estimated(dataset: &Dataset) -> Result<Option<WithStd>, RunDataError> {
-    let step_s = dataset.step_s();
-    if step_s < STEP_MIN_S {
-        return Ok(None);
-    }
-    let mut runs = prepare(dataset)?;
-    runs.retain(|run| run.role == Role::Fit);
-    let problem = FitProblem::new(runs, dataset.train.resistance);
+/// Returns whether samples `step_s` apart leave the time of the forces open.
+pub fn is_sought(step_s: f64) -> bool {
+    step_s >= STEP_MIN_S
+}
+
+/// Returns by how many s runs with samples `step_s` apart stamp forces late; `None` where the forces act after their
+/// stamps, or where it is not identifiable.
+pub fn estimated(problem: &FitProblem, step_s: f64) -> Option<WithStd> {
     let model = UpdatedModel::default().with(Arc::new(LateStamps));
     let fit = problem.fit_from_declared(&model, &[0.0]);
     if fit.observations() < OBSERVATIONS_MIN {
-        return Ok(None);
+        return None;
     }
     let deviation = deviations(&fit).std;
     let late = WithStd { value: fit.effect_parameters(0)[0], std: deviation[3] };
     let is_inside = LateStamps.at_bound(&[late.value]).is_none();
     let counts = late.value > LATE_SHARE_MIN * step_s && is_inside;
-    Ok((counts && is_stamped_late(late.value, late.std)).then_some(late))
+    (counts && is_stamped_late(late.value, late.std)).then_some(late)
 }
 
 /// Returns the estimate as a sentence to follow another.

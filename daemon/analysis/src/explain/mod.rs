@@ -50,8 +50,8 @@ use std::borrow::Cow;
 
 use dynocar_core::plausibility::Severity;
 
+use crate::dataset::Dataset;
 use crate::dataset::dataset_diagnostic::diagnostics;
-use crate::dataset::{Dataset, Role};
 use crate::parallel;
 use answer::{ExplainAnswer, WithStd};
 use drive_efficiency::EstimatedDrive;
@@ -118,15 +118,12 @@ fn explained<E: From<RunDataError> + Send>(
 ) -> Result<Explanation, E> {
     progress(0.0, "reading the runs");
     let density = if many.is_some() { Density::Thinned } else { Density::Recorded };
-    let Prepared { forces, preparation, runs } = Prepared::new(&dataset, density)?;
+    let Prepared { forces, preparation, problem, holdout } = Prepared::new(&dataset, density)?;
     let track = preparation.track().map(|track| &**track);
     let all = many.as_ref().map_or(&dataset.runs, |many| &many.dataset.runs);
     let diagnostics = diagnostics(preparation.train(), track, all);
     let recorded_step_s = dataset.step_s();
     drop(dataset);
-    let (fit_runs, holdout): (Vec<RunData>, Vec<RunData>) =
-        runs.into_iter().partition(|run| run.role == Role::Fit);
-    let problem = FitProblem::new(fit_runs, preparation.train().resistance);
     let search = Search {
         problem: &problem,
         holdout: &holdout,
@@ -220,20 +217,39 @@ impl FoundForces {
 struct Prepared {
     forces: FoundForces,
     preparation: Preparation,
-    runs: Vec<RunData>,
+    problem: FitProblem,
+    holdout: Vec<RunData>,
 }
 
 impl Prepared {
-    fn new(dataset: &Dataset, density: Density) -> Result<Self, RunDataError> {
-        let estimated_drive = drive_efficiency::estimated(dataset)?;
-        let (declared, drive) = (dataset, estimated_drive.as_ref().map(|it| it.drive));
-        let retaken = drive.map(|drive| dataset.with_drive(drive));
-        let dataset = retaken.as_ref().unwrap_or(dataset);
-        let late = force_time::estimated(dataset)?;
-        let moved = late.map(|late| dataset.with_forces_moved(late.value));
-        let dataset = moved.as_ref().unwrap_or(dataset);
-        let runs = evidence::prepare_at(dataset, density)?;
+    /// Makes the runs of a dataset ready: once, and once more for each correction of their forces that is found.
+    fn new(declared: &Dataset, density: Density) -> Result<Self, RunDataError> {
+        let step_s = declared.step_s();
+        let is_sought =
+            force_time::is_sought(step_s) || declared.runs.iter().any(|run| run.power().is_some());
+        let first = if is_sought { Density::Recorded } else { density };
+        let (mut problem, mut holdout) = FitProblem::of(declared, first)?;
+        let mut dataset = Cow::Borrowed(declared);
+        let estimated_drive = drive_efficiency::estimated(&problem, declared.train.drive);
+        if let Some(EstimatedDrive { drive, .. }) = &estimated_drive {
+            dataset = Cow::Owned(dataset.with_drive(*drive));
+            (problem, holdout) = FitProblem::of(&dataset, Density::Recorded)?;
+        }
+        let is_sought = force_time::is_sought(step_s);
+        let late = is_sought.then(|| force_time::estimated(&problem, step_s)).flatten();
+        if let Some(late) = late {
+            dataset = Cow::Owned(dataset.with_forces_moved(late.value));
+        }
+        if late.is_some() || first != density {
+            (problem, holdout) = FitProblem::of(&dataset, density)?;
+        }
+        let drive = estimated_drive.as_ref().map(|it| it.drive);
         let preparation = Preparation::new(declared, drive, late.map(|late| late.value));
-        Ok(Prepared { forces: FoundForces { estimated_drive, late }, preparation, runs })
+        Ok(Prepared {
+            forces: FoundForces { estimated_drive, late },
+            preparation,
+            problem,
+            holdout,
+        })
     }
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 use dynocar::dataset;
 use dynocar_analysis::dataset::{Dataset, Role};
 use dynocar_analysis::explain::answer::WithStd;
+use dynocar_analysis::explain::evidence::{Density, FitProblem};
 use dynocar_analysis::explain::{drive_efficiency, explain};
 use dynocar_model::train::PowerTrain;
 use dynocar_shared::SampleField;
@@ -126,9 +127,10 @@ pub fn by_power(surveyed: &Path) -> Result<ByPower, String> {
     let without: Vec<&str> = without.collect();
     std::fs::write(folder.path().join("dataset.toml"), without.join("\n")).map_err(words)?;
     let (recorded, powered) = (loaded(surveyed)?, loaded(folder.path())?);
-    let estimated = drive_efficiency::estimated(&powered)
-        .map_err(|error| error.to_string())?
-        .ok_or("no power")?;
+    let (problem, _) =
+        FitProblem::of(&powered, Density::Recorded).map_err(|error| error.to_string())?;
+    let declared = powered.train.drive;
+    let estimated = drive_efficiency::estimated(&problem, declared).ok_or("no power")?;
     let apart = apart(&recorded, &powered.with_drive(estimated.drive))?;
     let error_mps = held_out_mps(&powered)?;
     let auxiliaries_kw = estimated.answer.auxiliary_power_kw.ok_or("no auxiliaries")?;

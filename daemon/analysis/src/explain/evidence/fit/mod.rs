@@ -15,12 +15,13 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use super::integral::Response;
 use super::model::{UpdatedForces, UpdatedModel};
 use super::noise::{Noise, RunScatter};
-use super::run_data::RunData;
+use super::run_data::{Density, RunData, RunDataError, prepare_at};
 use super::run_scatter::SharedFilters;
 use super::run_scatter::{
     DeviationColumns, FactorMatrix, RunFactors, WeightedFilter, scatter_columns,
 };
 use super::whitener::BinWhitener;
+use crate::dataset::{Dataset, Role};
 use crate::parallel;
 use memory::RunMemory;
 pub use prior::{Positions, RunPositions};
@@ -222,6 +223,17 @@ fn union([low, high]: [f64; 2], [least, greatest]: [f64; 2]) -> [f64; 2] {
 }
 
 impl FitProblem {
+    /// Makes the runs of a dataset ready, and returns the problem of fitting its fit runs with those held out.
+    ///
+    /// # Errors
+    ///
+    /// The first run without usable samples.
+    pub fn of(dataset: &Dataset, density: Density) -> Result<(Self, Vec<RunData>), RunDataError> {
+        let runs = prepare_at(dataset, density)?.into_iter();
+        let (fit, held_out) = runs.partition(|run| run.role == Role::Fit);
+        Ok((FitProblem::new(fit, dataset.train.resistance), held_out))
+    }
+
     /// The problem of fitting these runs around declared Davis coefficients.
     pub fn new(runs: Vec<RunData>, declared: Davis) -> Self {
         // A train without a declared coefficient still has a scale for it.
