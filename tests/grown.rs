@@ -124,7 +124,7 @@ fn the_pipeline_identifies_the_mass() {
     let kind = PipelineKind::from_name("mass_impulse").unwrap();
     let settings = EstimatorSettings::default_of(kind).unwrap();
     let samples = published_samples(&dataset, TrainId(1));
-    let snapshot = identify(&dataset, &samples, &settings).unwrap();
+    let snapshot = identify(&dataset, &samples, &settings).unwrap().estimate();
     let mass_t = snapshot.value(Parameter::Mass).unwrap();
     assert!((mass_t - 200.0).abs() < 4.0, "{mass_t}");
     assert_eq!(snapshot.status(), Status::Estimated);

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use dynocar::dataset;
 use dynocar_analysis::dataset::Dataset;
-use dynocar_analysis::identify::{published_samples, snapshot_after};
+use dynocar_analysis::identify::{identify, published_samples};
 use dynocar_estimators::EstimatorSettings;
 use dynocar_fmu::estimators::PIPELINES;
 use dynocar_fmu::ffi::Status;
@@ -80,7 +80,9 @@ fn assert_as_identified(fmu: &Fmu, dataset: &Dataset, count: usize) {
     let samples = &published_samples(dataset, TrainId(1))[..count];
     let speed_mps = samples[count - 1].speed_mps;
     let identified = |kind: PipelineKind| {
-        snapshot_after(dataset, samples, &EstimatorSettings::default_of(kind).unwrap()).unwrap()
+        *identify(dataset, samples, &EstimatorSettings::default_of(kind).unwrap())
+            .unwrap()
+            .snapshot()
     };
     let snapshots = PIPELINES.map(identified);
     for (reference, variable) in ESTIMATORS.variables.iter().enumerate() {

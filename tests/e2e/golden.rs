@@ -7,7 +7,7 @@ use dynocar::config::is_slow;
 use dynocar::dataset;
 use dynocar::replay::{Rate, Replayer};
 use dynocar_analysis::dataset::Dataset;
-use dynocar_analysis::identify::{default_estimators, published_samples, snapshot_after};
+use dynocar_analysis::identify::{default_estimators, identify, published_samples};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId};
 use dynocar_tests::golden::{self, Golden, TOLERANCE, without_stamps};
 use dynocar_tests::process::DaemonSite;
@@ -102,7 +102,7 @@ fn rate_and_other_pipelines_change_no_bit() {
     let estimators = default_estimators();
     let v_mils = estimators.iter().find(|it| it.kind() == PipelineKind::VMils).expect("v_mils");
     let offline =
-        without_stamps(&snapshot_after(&dataset, &samples, v_mils).expect("default settings"));
+        without_stamps(identify(&dataset, &samples, v_mils).expect("default settings").snapshot());
     let all: Vec<PipelineKind> = estimators.iter().map(|it| it.kind()).collect();
     let few = [PipelineKind::MassKalman, PipelineKind::VMils];
     let cases: [(Rate, &[PipelineKind]); 3] =

@@ -6,7 +6,7 @@ use std::time::Duration;
 use dynocar::config::is_slow;
 use dynocar::dataset;
 use dynocar::replay::{Rate, ReplayReport, Replayer};
-use dynocar_analysis::identify::{default_estimators, published_samples, snapshot_after};
+use dynocar_analysis::identify::{default_estimators, identify, published_samples};
 use dynocar_shared::{ParameterSnapshot, TrainId};
 use dynocar_tests::golden::without_stamps;
 use dynocar_tests::process::DaemonSite;
@@ -63,7 +63,7 @@ fn every_pipeline_gives_the_same_bits_online_and_offline() {
     assert_eq!(report.snapshots.len(), estimators.len());
     for settings in &estimators {
         let kind = settings.kind();
-        let offline = without_stamps(&snapshot_after(&dataset, &samples, settings).unwrap());
+        let offline = without_stamps(identify(&dataset, &samples, settings).unwrap().snapshot());
         let number = kind as u32;
         let online = report.snapshots.iter().find(|it| it.pipeline_kind == number).unwrap();
         let online = without_stamps(online);

@@ -68,7 +68,7 @@ fn of_run(dataset: &Dataset, run: &Run, kind: PipelineKind, true_kg: f64) -> Vec
             .iter()
             .map(|sample| TrainSample { valid: sample.valid & !SampleField::Mass.bit(), ..*sample })
             .collect();
-        let said = identify(dataset, &samples, &settings).unwrap();
+        let said = identify(dataset, &samples, &settings).unwrap().estimate();
         let std_t = said.std(Parameter::Mass)?;
         Some((said.value(Parameter::Mass)? - 1e-3 * true_kg) / std_t)
     };

@@ -6,63 +6,38 @@ use dynocar_core::pipeline::braking::intake::DeclaredGear;
 use dynocar_core::pipeline::quantities::candidates;
 use dynocar_core::pipeline::{Pipeline, SettingError};
 use dynocar_estimators::EstimatorSettings;
+use dynocar_model::track::Track;
+use dynocar_model::train::TrainModel;
 use dynocar_shared::{
     ParameterSnapshot, PipelineKind, Quantity, Reason, SampleField, TrainId, TrainSample,
 };
 
-use crate::dataset::{Dataset, Run};
+use crate::dataset::{DATASET_TRAIN, Dataset, Run};
 
 /// Returns the samples of all runs, in file order, as a controller publishes them: with consecutive sequence numbers,
 /// each run under a number of its own.
 pub fn published_samples(dataset: &Dataset, train: TrainId) -> Vec<TrainSample> {
-    samples_of_runs(&dataset.runs, train)
+    let samples = dataset.runs.iter().flat_map(|run| published(run, train)).zip(1..);
+    samples.map(|(sample, sequence)| TrainSample { sequence, ..sample }).collect()
 }
 
-/// Returns the samples of some runs as a controller would publish them if it had driven no other runs.
-pub fn samples_of_runs<'a>(
-    runs: impl IntoIterator<Item = &'a Run>,
-    train: TrainId,
-) -> Vec<TrainSample> {
-    let mut samples = Vec::new();
-    for run in runs {
-        for sample in &run.samples {
-            let sequence = samples.len() as u64 + 1;
-            samples.push(TrainSample { sequence, run: run.number, train_id: train.0, ..*sample });
-        }
-    }
-    samples
+/// Returns the samples of a run with its number, for a train.
+fn published(run: &Run, train: TrainId) -> impl Iterator<Item = TrainSample> {
+    run.samples.iter().map(move |it| TrainSample { run: run.number, train_id: train.0, ..*it })
 }
 
 /// Speed in m/s below which a train may be about to stop.
 const STOPPING_MPS: f64 = 2.0;
 
-/// Runs one estimator with its settings over the samples; gives the last snapshot, as a controller reads it.
-///
-/// # Errors
-///
-/// When a setting is out of range.
-pub fn snapshot_after(
-    dataset: &Dataset,
-    samples: &[TrainSample],
-    settings: &EstimatorSettings,
-) -> Result<ParameterSnapshot, SettingError> {
-    process(dataset, samples, settings, |_, _| {})
-}
-
-/// Runs one estimator with its settings over the samples and returns its last estimate. At the last stop another load
-/// may board, so that the estimator waits: then the estimate is that on arrival, which holds for the recorded runs.
-///
-/// # Errors
-///
-/// When a setting is out of range.
+/// One estimator in a pipeline of its own, which learns from samples as in the daemon.
 ///
 /// # Examples
 ///
 /// ```
 /// use dynocar_analysis::dataset::Dataset;
-/// use dynocar_analysis::identify::{identify, published_samples};
+/// use dynocar_analysis::identify::Identification;
 /// use dynocar_estimators::EstimatorSettings;
-/// use dynocar_shared::{PipelineKind, Status, TrainId};
+/// use dynocar_shared::{PipelineKind, Status};
 ///
 /// let described = "[dataset]\nname = \"a day\"\n[train]\nfile = \"train.toml\"\n[columns]\n\
 ///     time = { column = \"t\", unit = \"s\" }\nspeed = { column = \"v\", unit = \"km/h\" }\n\
@@ -72,57 +47,94 @@ pub fn snapshot_after(
 /// let monday = "t,v,z\n0,10.0,40\n1,10.6,40\n2,11.2,40\n3,11.8,40\n";
 /// let files = [("dataset.toml", described), ("train.toml", train), ("monday.csv", monday)];
 /// let dataset = Dataset::load(&files[..])?;
-/// let samples = published_samples(&dataset, TrainId(1));
 /// let settings = EstimatorSettings::default_of(PipelineKind::TrainKalman).expect("it is built in");
+/// let mut identification = Identification::new(&dataset.train, &dataset.track, &settings)?;
+/// identification.update_with_run(&dataset.runs[0]);
 /// // Three seconds determine nothing.
-/// let snapshot = identify(&dataset, &samples, &settings)?;
-/// assert_eq!(snapshot.status(), Status::Unestimated);
+/// assert_eq!(identification.estimate().status(), Status::Unestimated);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+pub struct Identification {
+    pipeline: Pipeline,
+    /// The snapshot on arrival at the last stop.
+    arrived: Option<ParameterSnapshot>,
+}
+
+impl Identification {
+    /// Before the first sample of [`DATASET_TRAIN`] on a line, which need not be known.
+    ///
+    /// # Errors
+    ///
+    /// When a setting is out of range.
+    pub fn new(
+        train: &Arc<TrainModel>,
+        track: &Option<Arc<Track>>,
+        settings: &EstimatorSettings,
+    ) -> Result<Self, SettingError> {
+        let (train, track) = (Arc::clone(train), track.clone());
+        let estimator = settings.build(&train)?;
+        let pipeline = Pipeline::new(DATASET_TRAIN, 0, train, track, estimator);
+        Ok(Identification { pipeline, arrived: None })
+    }
+
+    /// Takes the next sample.
+    pub fn update(&mut self, sample: &TrainSample) {
+        let before = self.pipeline.snapshot();
+        match (is_open(before), sample.speed_mps < STOPPING_MPS) {
+            (false, true) => self.arrived = Some(*before),
+            // The load that drove since was not weighed.
+            (true, false) => self.arrived = None,
+            _ => {}
+        }
+        self.pipeline.process(sample);
+    }
+
+    /// Takes the samples of the next run, which follow those of the last one without a gap of the sequence number.
+    pub fn update_with_run(&mut self, run: &Run) {
+        let first = self.pipeline.snapshot().sample_sequence + 1;
+        for (sample, sequence) in published(run, DATASET_TRAIN).zip(first..) {
+            self.update(&TrainSample { sequence, ..sample });
+        }
+    }
+
+    /// Returns the last snapshot, as a controller reads it.
+    pub fn snapshot(&self) -> &ParameterSnapshot {
+        self.pipeline.snapshot()
+    }
+
+    /// Returns the last estimate. At the last stop another load may board, so that the estimator waits: then the
+    /// estimate is that on arrival, which holds for the recorded runs.
+    pub fn estimate(&self) -> ParameterSnapshot {
+        let last = *self.snapshot();
+        ParameterSnapshot {
+            sample_sequence: last.sample_sequence,
+            samples_used: last.samples_used,
+            samples_rejected: last.samples_rejected,
+            samples_lost: last.samples_lost,
+            rejected_by_reason: last.rejected_by_reason,
+            updates: last.updates,
+            ..self.arrived.filter(|_| is_open(&last)).unwrap_or(last)
+        }
+    }
+}
+
+fn is_open(snapshot: &ParameterSnapshot) -> bool {
+    snapshot.reason() == Some(Reason::LoadMayHaveChanged)
+}
+
+/// Runs one estimator with its settings over samples, and returns it.
+///
+/// # Errors
+///
+/// When a setting is out of range.
 pub fn identify(
     dataset: &Dataset,
     samples: &[TrainSample],
     settings: &EstimatorSettings,
-) -> Result<ParameterSnapshot, SettingError> {
-    let is_open =
-        |snapshot: &ParameterSnapshot| snapshot.reason() == Some(Reason::LoadMayHaveChanged);
-    let mut arrived: Option<ParameterSnapshot> = None;
-    let last = process(dataset, samples, settings, |before, sample| {
-        match (is_open(before), sample.speed_mps < STOPPING_MPS) {
-            (false, true) => arrived = Some(*before),
-            // The load that drove since was not weighed.
-            (true, false) => arrived = None,
-            _ => {}
-        }
-    })?;
-    let arrived = arrived.filter(|_| is_open(&last)).unwrap_or(last);
-    Ok(ParameterSnapshot {
-        sample_sequence: last.sample_sequence,
-        samples_used: last.samples_used,
-        samples_rejected: last.samples_rejected,
-        samples_lost: last.samples_lost,
-        rejected_by_reason: last.rejected_by_reason,
-        updates: last.updates,
-        ..arrived
-    })
-}
-
-/// Calls `see` with the snapshot before each sample.
-fn process(
-    dataset: &Dataset,
-    samples: &[TrainSample],
-    settings: &EstimatorSettings,
-    mut see: impl FnMut(&ParameterSnapshot, &TrainSample),
-) -> Result<ParameterSnapshot, SettingError> {
-    let train = Arc::clone(&dataset.train);
-    let estimator = settings.build(&train)?;
-    let train_id = samples.first().map_or(TrainId(1), |sample| TrainId(sample.train_id));
-    let mut pipeline = Pipeline::new(train_id, 0, train, dataset.track.clone(), estimator);
-    for sample in samples {
-        see(pipeline.snapshot(), sample);
-        pipeline.process(sample);
-    }
-    Ok(*pipeline.snapshot())
+) -> Result<Identification, SettingError> {
+    let mut identification = Identification::new(&dataset.train, &dataset.track, settings)?;
+    samples.iter().for_each(|sample| identification.update(sample));
+    Ok(identification)
 }
 
 /// Returns every kind of estimator that learns something, with its default settings.
@@ -135,26 +147,23 @@ pub fn default_estimators() -> Vec<EstimatorSettings> {
 }
 
 /// Returns the recommended estimators: the best measured one for each quantity that the train's file and the
-/// recordings permit, and the monitor of the model.
-pub fn recommended_estimators(dataset: &Dataset) -> Vec<EstimatorSettings> {
-    let best = Quantity::ALL.iter().filter(|&&quantity| is_permitted(quantity, dataset));
+/// recordings permit, and the monitor of the model. Without the pressure of a brake cylinder in the recordings, and the
+/// force that the declared gear makes of it, brake coefficients' estimators would only wait.
+pub fn recommended_estimators(train: &TrainModel, has_pressure: bool) -> Vec<EstimatorSettings> {
+    let is_permitted = |quantity| match quantity {
+        Quantity::BrakeFriction | Quantity::BrakingRatio => {
+            has_pressure && DeclaredGear::from_gear(&train.brake_gear).is_some()
+        }
+        Quantity::Resistance | Quantity::Mass | Quantity::Adhesion => true,
+    };
+    let best = Quantity::ALL.iter().filter(|&&quantity| is_permitted(quantity));
     let mut kinds: Vec<_> = best.map(|&quantity| candidates(quantity)[0]).collect();
     kinds.push(PipelineKind::ResidualMonitor);
     kinds.dedup();
     kinds.into_iter().filter_map(EstimatorSettings::default_of).collect()
 }
 
-/// Brake coefficients need the pressure and the force that the gear makes of it; without data, the other estimators
-/// only wait.
-fn is_permitted(quantity: Quantity, dataset: &Dataset) -> bool {
-    let has_pressure = |run: &Run| {
-        run.samples.iter().any(|it| it.get(SampleField::BrakeCylinderPressure).is_some())
-    };
-    match quantity {
-        Quantity::BrakeFriction | Quantity::BrakingRatio => {
-            DeclaredGear::from_gear(&dataset.train.brake_gear).is_some()
-                && dataset.runs.iter().any(has_pressure)
-        }
-        Quantity::Resistance | Quantity::Mass | Quantity::Adhesion => true,
-    }
+/// Returns whether a run records the pressure of a brake cylinder.
+pub fn has_pressure(run: &Run) -> bool {
+    run.samples.iter().any(|it| it.get(SampleField::BrakeCylinderPressure).is_some())
 }

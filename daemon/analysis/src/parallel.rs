@@ -7,6 +7,11 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
+/// Returns the number of threads that share the work.
+pub fn threads() -> usize {
+    rayon::current_num_threads()
+}
+
 /// Returns the results of `make` for each number below a count.
 pub fn of_each_number<R: Send>(count: usize, make: impl Fn(usize) -> R + Sync) -> Vec<R> {
     in_tasks(count, 1, make)

@@ -218,16 +218,27 @@ impl DatasetHead {
         Ok(DatasetHead { manifest, train: Arc::new(train), track })
     }
 
+    /// Returns the dataset without its runs.
+    pub fn without_runs(&self) -> Dataset {
+        let Manifest { name, description, .. } = &self.manifest;
+        Dataset {
+            name: name.clone(),
+            description: description.clone(),
+            train: self.train.clone(),
+            track: self.track.clone(),
+            runs: Vec::new(),
+        }
+    }
+
     /// Reads all runs.
     ///
     /// # Errors
     ///
     /// The first mistake in one of their files, with line and column.
-    pub fn read(self, files: &(impl DatasetFiles + ?Sized)) -> Result<Dataset, DatasetError> {
+    pub fn read(&self, files: &(impl DatasetFiles + ?Sized)) -> Result<Dataset, DatasetError> {
         // The first mistake is that of the first run in the manifest, in any order of reading.
         let runs = self.read_each(files).into_iter().collect::<Result<_, _>>()?;
-        let Manifest { name, description, .. } = self.manifest;
-        Ok(Dataset { name, description, train: self.train, track: self.track, runs })
+        Ok(Dataset { runs, ..self.without_runs() })
     }
 
     /// Reads all runs, in the order of the manifest, each or the first mistake in its file.

@@ -10,7 +10,6 @@ use dynocar_analysis::dataset::{
     Dataset, DatasetFiles, DatasetHead, FileProblem, Manifest, RunContent, is_parquet,
 };
 use dynocar_mcap::recording::Recording;
-use dynocar_model::units::Unit;
 use dynocar_parquet::columns::columns_of;
 use dynocar_parquet::reading;
 
@@ -143,20 +142,8 @@ pub fn open<'p>(
 ///
 /// The first mistake, with file, line and choices.
 pub fn load<'p>(source: impl Into<DatasetSource<'p>>) -> Result<Dataset, LoadError> {
-    load_with_speed_unit(source).map(|(dataset, _)| dataset)
-}
-
-/// Reads a dataset with all its runs, and the unit in which they hold the speed.
-///
-/// # Errors
-///
-/// The first mistake, with file, line and choices.
-pub fn load_with_speed_unit<'p>(
-    source: impl Into<DatasetSource<'p>>,
-) -> Result<(Dataset, Unit), LoadError> {
     let (files, head) = open(source)?;
-    let unit = head.manifest.speed_unit();
-    Ok((head.read(&files)?, unit))
+    Ok(head.read(&files)?)
 }
 
 /// Returns the way from a folder, which need not be there yet, to a file.

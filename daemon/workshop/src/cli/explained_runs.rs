@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use std::path::PathBuf;
 
 use dynocar_analysis::dataset::{
-    Dataset, DatasetError, DatasetFiles, DatasetHead, Manifest, Run, SourcePosition,
+    Dataset, DatasetError, DatasetFiles, DatasetHead, Run, SourcePosition,
 };
 use dynocar_analysis::explain::evidence::{Density, RunData, RunDataError};
 use dynocar_analysis::explain::many::{Held, Many};
@@ -68,14 +68,7 @@ impl ExplainedRuns {
         let runs: Result<Vec<(Run, Option<Run>)>, DatasetError> = runs.collect();
         let (known, chosen): (Vec<Run>, Vec<Option<Run>>) =
             runs.map_err(LoadError::from)?.into_iter().unzip();
-        let Manifest { name, description, .. } = &head.manifest;
-        let dataset = |runs| Dataset {
-            name: name.clone(),
-            description: description.clone(),
-            train: head.train.clone(),
-            track: head.track.clone(),
-            runs,
-        };
+        let dataset = |runs| Dataset { runs, ..head.without_runs() };
         let chosen = dataset(chosen.into_iter().flatten().collect());
         let (path, train) = (source.path.to_path_buf(), source.train);
         let Some(held) = held else {

@@ -6,24 +6,25 @@ mod runs;
 use std::path::PathBuf;
 
 use clap::Args;
-use dynocar_analysis::dataset::{Dataset, DatasetDiagnostic};
+use dynocar_analysis::dataset::{Dataset, DatasetDiagnostic, DatasetHead, Run};
+use dynocar_analysis::identify::{
+    self, Identification, default_estimators, recommended_estimators,
+};
+use dynocar_analysis::parallel;
 use dynocar_core::plausibility::Severity;
 use dynocar_estimators::EstimatorSettings;
 use dynocar_model::train::PowerTrain;
 use dynocar_model::units::Unit;
-use dynocar_shared::{HALF_95, Parameter, TrainId, schema};
+use dynocar_shared::{HALF_95, Parameter, ParameterSnapshot, PipelineKind, schema};
 use serde::Serialize;
 
 use self::answer::EstimatorAnswer;
 use self::runs::{EstimatorSpread, RunAnswer};
-use crate::dataset;
+use crate::dataset::{self, FilesOfDataset};
 use crate::run_facts::diagnostics;
 use dynocar::cli::Failure;
-use dynocar::dataset::SourceArguments;
+use dynocar::dataset::{LoadError, SourceArguments};
 use dynocar::output::{give, require_files};
-use dynocar_analysis::identify::{
-    default_estimators, identify, recommended_estimators, samples_of_runs,
-};
 
 /// Estimate resistance, mass, adhesion and friction from recorded runs.
 #[derive(Debug, Args)]
@@ -104,16 +105,26 @@ pub fn answer(question: &Question) -> Result<IdentifyAnswer, Failure> {
         (false, []) => None,
         (false, names) => Some(named_estimators(names)?),
     };
-    let (mut dataset, speed_unit) = dataset::load_with_speed_unit(question.source.source())?;
+    let (files, head) = dataset::open(question.source.source())?;
+    let recommended = |has_pressure| recommended_estimators(&head.train, has_pressure);
     let is_chosen = named.is_some();
-    let estimators = named.unwrap_or_else(|| recommended_estimators(&dataset));
-    if question.traction_only {
-        dataset.keep_traction_only();
+    let mut estimators = named.unwrap_or_else(|| recommended(true));
+    let learned = Learned::from_runs(&files, &head, &estimators, question)?;
+    if !is_chosen {
+        estimators = recommended(learned.has_pressure);
     }
-    let all: Vec<usize> = (0..dataset.runs.len()).collect();
-    let mut learned = learned(&dataset, &all, (&estimators, speed_unit))?;
-    let by_run = || by_run(&dataset, (&estimators, speed_unit));
-    let mut runs = if question.per_run { Some(by_run()?) } else { None };
+    let speed_unit = head.manifest.speed_unit();
+    let answers = |of: &[Snapshot]| -> Vec<EstimatorAnswer> {
+        let permitted =
+            of.iter().filter(|(kind, _)| estimators.iter().any(|it| it.kind() == *kind));
+        permitted.map(|(kind, it)| EstimatorAnswer::new(*kind, it, speed_unit)).collect()
+    };
+    let dataset = learned.dataset;
+    let mut runs = question.per_run.then(|| {
+        let alone = dataset.runs.iter().zip(&learned.by_run);
+        alone.map(|(run, of)| RunAnswer::new(run, answers(of))).collect::<Vec<_>>()
+    });
+    let mut learned = answers(&learned.from_all);
     let mut diagnostics = dataset.diagnostics();
     let of_runs = runs.iter_mut().flatten().flat_map(RunAnswer::estimators);
     for answer in learned.iter_mut().chain(of_runs) {
@@ -127,7 +138,7 @@ pub fn answer(question: &Question) -> Result<IdentifyAnswer, Failure> {
     let declared_kg = dataset.runs.last().map_or(dataset.train.mass_kg, |run| run.mass_kg);
     diagnostics.extend(learned.iter().find_map(|it| it.contradiction(declared_kg)));
     Ok(IdentifyAnswer {
-        dataset: dataset.name.clone(),
+        dataset: dataset.name,
         speed_unit,
         diagnostics,
         estimators: learned,
@@ -137,33 +148,67 @@ pub fn answer(question: &Question) -> Result<IdentifyAnswer, Failure> {
     })
 }
 
-/// Returns the estimates of every estimator from some runs, one after the other.
-fn learned(
-    dataset: &Dataset,
-    runs: &[usize],
-    (estimators, speed_unit): (&[EstimatorSettings], Unit),
-) -> Result<Vec<EstimatorAnswer>, Failure> {
-    let samples = samples_of_runs(runs.iter().map(|&index| &dataset.runs[index]), TrainId(1));
-    let snapshots: Vec<_> = std::thread::scope(|scope| {
-        let threads: Vec<_> = estimators
-            .iter()
-            .map(|settings| scope.spawn(|| identify(dataset, &samples, settings)))
-            .collect();
-        threads.into_iter().map(|thread| thread.join().expect("an estimator")).collect()
-    });
-    let answer = |(settings, snapshot): (&EstimatorSettings, Result<_, _>)| match snapshot {
-        Ok(snapshot) => Ok(EstimatorAnswer::new(settings.kind(), &snapshot, speed_unit)),
-        Err(error) => Err(Failure::Input(format!("{error}"))),
-    };
-    estimators.iter().zip(snapshots).map(answer).collect()
+/// An estimator's kind with its last estimate.
+type Snapshot = (PipelineKind, ParameterSnapshot);
+
+/// Estimates from the runs of a dataset.
+struct Learned {
+    /// The dataset, without the samples of its runs.
+    dataset: Dataset,
+    /// From all runs, one after the other.
+    from_all: Vec<Snapshot>,
+    /// From each run alone, where that was asked for.
+    by_run: Vec<Vec<Snapshot>>,
+    has_pressure: bool,
 }
 
-fn by_run(
-    dataset: &Dataset,
-    learners: (&[EstimatorSettings], Unit),
-) -> Result<Vec<RunAnswer>, Failure> {
-    let one = |(index, run)| Ok(RunAnswer::new(run, learned(dataset, &[index], learners)?));
-    dataset.runs.iter().enumerate().map(one).collect()
+impl Learned {
+    /// Learns from the runs one after the other, of which only as many are in memory as there are threads.
+    fn from_runs(
+        files: &FilesOfDataset,
+        head: &DatasetHead,
+        estimators: &[EstimatorSettings],
+        question: &Question,
+    ) -> Result<Self, Failure> {
+        let begin = || {
+            let new = |it| Identification::new(&head.train, &head.track, it);
+            let all: Result<Vec<_>, _> = estimators.iter().map(new).collect();
+            all.map_err(|error| Failure::Input(format!("{error}")))
+        };
+        let of = |all: &[Identification]| -> Vec<Snapshot> {
+            let estimates = all.iter().map(Identification::estimate);
+            estimators.iter().map(EstimatorSettings::kind).zip(estimates).collect()
+        };
+        let mut dataset = head.without_runs();
+        let (mut all, mut by_run, mut has_pressure) = (begin()?, Vec::new(), false);
+        let indices: Vec<usize> = (0..head.manifest.runs.len()).collect();
+        for indices in indices.chunks(parallel::threads()) {
+            let read = parallel::of_each(indices, |&index| {
+                let mut run = head.read_run(files, index).map_err(LoadError::from)?;
+                if question.traction_only {
+                    run.keep_traction_only();
+                }
+                Ok(run)
+            });
+            let mut runs = read.into_iter().collect::<Result<Vec<Run>, LoadError>>()?;
+            all = parallel::of_each_owned(all, |_, mut identification| {
+                runs.iter().for_each(|run| identification.update_with_run(run));
+                identification
+            });
+            if question.per_run {
+                let alone = parallel::of_each(&runs, |run| {
+                    let mut own = begin()?;
+                    own.iter_mut().for_each(|it| it.update_with_run(run));
+                    Ok(of(&own))
+                });
+                by_run.extend(alone.into_iter().collect::<Result<Vec<_>, Failure>>()?);
+            }
+            has_pressure |= runs.iter().any(identify::has_pressure);
+            runs.iter_mut().for_each(|run| drop(run.split_off_samples()));
+            dataset.runs.append(&mut runs);
+        }
+        Ok(Learned { dataset, from_all: of(&all), by_run, has_pressure })
+    }
 }
 
 fn named_estimators(names: &[String]) -> Result<Vec<EstimatorSettings>, Failure> {

@@ -46,7 +46,10 @@ fn snapshots(dataset: &Path) -> Result<Vec<ParameterSnapshot>, String> {
     let samples = published_samples(&dataset, TrainId(1));
     default_estimators()
         .iter()
-        .map(|settings| identify(&dataset, &samples, settings).map_err(|error| error.to_string()))
+        .map(|settings| {
+            let identified = identify(&dataset, &samples, settings);
+            identified.map(|it| it.estimate()).map_err(|error| error.to_string())
+        })
         .collect()
 }
 

@@ -154,7 +154,7 @@ pub fn alone(dataset: &Dataset, kind: PipelineKind) -> StopMasses {
                     ..uncounted(sample)
                 })
                 .collect();
-            let said = identify(dataset, &samples, &settings).expect("default settings");
+            let said = identify(dataset, &samples, &settings).expect("default settings").estimate();
             masses.take(&said, counted_t(own));
         }
     }
