@@ -4,8 +4,7 @@ use std::ops::RangeInclusive;
 
 use serde::Serialize;
 
-use super::parameters::{BrakeParameters, Correction};
-use super::speed_steps::SpeedSteps;
+use super::parameters::{BrakeParameters, Correction, SpeedSteps};
 use crate::dataset::DatasetError;
 use crate::dataset::document::Item;
 

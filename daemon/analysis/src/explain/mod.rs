@@ -8,37 +8,32 @@
 //! - [`force_time`]: forces that act before their time stamps
 //! - [`hypothesis`], [`effects`]: the interface of an effect; the library, one file for each kind
 //! - [`scan`], [`places`]: the gain of a force of a given shape, and the interval, runs or window of time where it acts
-//! - [`residual_pressure`]: brake-cylinder pressure that stays while no brake is reported
 //! - [`selection`]: the search for effects, their significance, the evidence of each run, and the finished model fitted
 //!   jointly with the usual errors
-//! - [`score`], [`stop_to_stop`], `bootstrap`: open-loop prediction of fit and holdout runs
+//! - [`score`], [`stop_to_stop`]: open-loop prediction of fit and holdout runs
 //! - [`many`]: with many runs, some of them for the search, all of them for sizes and scores
-//! - [`course`], [`over_time`], [`held_out`]: numbers that differ between runs, and confirmation by the holdout runs
-//! - [`unexplained`], [`identifiability`], [`competing`], [`meaning`], `caveats`, [`verdict`],
-//!   [`answer`]: the statement
+//! - [`over_time`], [`held_out`]: numbers that differ between runs, and confirmation by the holdout runs
+//! - [`unexplained`], [`competing`], [`meaning`], [`caveats`], [`verdict`], [`answer`]: the
+//!   statement
 //! - [`report`]: further contents of a report
 //!
 //! [`explain`] runs it all.
 
 pub mod answer;
-mod bootstrap;
-mod caveats;
+pub mod caveats;
 pub mod competing;
-pub mod course;
 pub mod drive_efficiency;
 pub mod effects;
 pub mod evidence;
 pub mod force_time;
 pub mod held_out;
 pub mod hypothesis;
-pub mod identifiability;
 mod location;
 pub mod many;
 pub mod meaning;
 pub mod over_time;
 pub mod places;
 pub mod report;
-pub mod residual_pressure;
 pub mod scan;
 pub mod score;
 pub mod selection;

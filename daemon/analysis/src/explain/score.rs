@@ -2,13 +2,13 @@
 
 use dynocar_model::simulate::{Prediction, Restart, SpeedError};
 
-use super::bootstrap::intervals_95;
 use super::evidence::{Fit, FitProblem, RunData, RunFactors, UpdatedForces};
 use super::selection::without_each_run;
 use super::stop_to_stop::Judged;
 use super::stop_to_stop::stop_runs;
 use super::stop_to_stop::{self, StopToStop};
 use crate::parallel;
+use crate::statistics::intervals_95;
 
 /// Errors of the model without and with the effects.
 #[derive(Clone, Debug, Default, PartialEq)]

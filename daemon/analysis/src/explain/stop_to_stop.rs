@@ -11,7 +11,7 @@ use std::ops::Range;
 use dynocar_model::simulate::{OpenLoopRecording, STANDING_MPS, departs};
 use serde::Serialize;
 
-use super::bootstrap::intervals_95;
+use crate::statistics::intervals_95;
 use crate::statistics::{median, rms};
 
 /// Least moving time in s of a run that counts: a shorter one is a shunt in a queue, and shows little.

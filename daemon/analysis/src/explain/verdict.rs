@@ -11,14 +11,14 @@ use super::answer::{
     BaseAnswer, Considered, DavisDeviations, EffectAnswer, EffectMeaning, ExplainAnswer,
     HeldOutAnswer, Location, Verdict, VerdictWords,
 };
-use super::caveats::{FinishedFit, caveats, told_by_data, trimmed};
-use super::competing::runners_up;
-use super::competing::{CompetingHypotheses, competing_hypotheses, kinds_of, separating_run};
+use super::caveats::{FinishedFit, caveats, identifiability, told_by_data, trimmed};
+use super::competing::{
+    CompetingHypotheses, competing_hypotheses, kinds_of, runners_up, separating_run,
+};
 use super::effects::ReportContext;
 use super::evidence::p_value;
 use super::held_out::HeldOutEffect;
 use super::hypothesis::{Hypothesis, ReportedValues};
-use super::identifiability::identifiability;
 use super::report::effect::{contradicting_scales, located, small, verdict_words};
 use super::score::{self, PredictionScore};
 use super::selection::{

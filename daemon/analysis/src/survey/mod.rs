@@ -11,7 +11,7 @@
 //! - [`alignment`], `silence`, `tracking`, `centring`, `both_directions`, [`driven_line`]: the line that
 //!   is driven repeatedly
 //! - [`chainage`]: a chainage for every row; [`stops`]: places where the passes stop
-//! - [`observation`], [`common`], [`profile`], [`learn`]: gradient, resistance, mass,
+//! - [`observation`], [`profile`], [`learn`]: gradient, resistance, mass,
 //!   time offset and friction brake from the balance of forces; [`normal`], [`banded`]: its unknown heights,
 //!   their equations and the solver
 //! - [`survey()`]: all steps in order
@@ -21,7 +21,6 @@ pub mod banded;
 mod both_directions;
 mod centring;
 pub mod chainage;
-pub mod common;
 pub mod driven_line;
 pub mod geodesy;
 pub mod learn;

@@ -4,7 +4,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::banded::{Banded, BandedCholesky, NotPositive};
-use super::common::Common;
+use super::observation::Common;
 
 const COUNT: usize = Common::COUNT;
 

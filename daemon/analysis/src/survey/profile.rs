@@ -6,9 +6,8 @@
 //! the work grows linearly with the number of passes.
 
 use super::banded::NotPositive;
-use super::common::{Common, GRAVITY_MPS2, Prior};
 use super::normal::{HEIGHT_STEP_M, HeightLayout, LineCourse, Normal};
-use super::observation::BlockDifference;
+use super::observation::{BlockDifference, Common, GRAVITY_MPS2, Prior};
 use crate::parallel;
 use crate::statistics::middle;
 

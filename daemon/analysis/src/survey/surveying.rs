@@ -3,12 +3,11 @@
 use super::alignment::{FoundCurve, curves, turning_rad};
 use super::banded::NotPositive;
 use super::chainage::WheelsAndLag;
-use super::common::Prior;
 use super::driven_line::{Alignments, find, pass_of};
 use super::geodesy::LocalPlane;
 use super::learn::{LearnedProfile, acting_from_pa, learn};
 use super::normal::{HeightLayout, LineCourse};
-use super::observation::{BlockDifference, observations};
+use super::observation::{BlockDifference, Prior, observations};
 use super::profile::{Altitude, ProfileEvidence, is_one_of_few};
 use super::recording::{RawRecording, RecordingPart, SurveyRecording, plane_of, recording_parts};
 use super::stops::{SurveyedStop, stands, stops};

@@ -19,7 +19,6 @@ mod lateness;
 mod local_resistance;
 mod low_adhesion;
 mod mass_change;
-mod policy;
 mod proposal;
 mod rotating_mass;
 mod speed_delay;
@@ -38,8 +37,9 @@ pub use super::hypothesis::{
     SharedHypothesis, Turn,
 };
 pub use gradient_error::map_error;
-pub use policy::{Certainty, DeclaredFigure, Everyday, Policy};
-pub use proposal::{Candidate, Effect, Proposal, Whole};
+pub use proposal::{
+    Candidate, Certainty, DeclaredFigure, Effect, Everyday, Policy, Proposal, Whole,
+};
 pub use usual_errors::{map_error_as_fitted, usual_errors};
 pub use vertical_curves::{USUAL_LENGTH_M, vertical_curves};
 

@@ -11,13 +11,9 @@ mod bins;
 mod cleaning;
 mod criterion;
 mod drift;
-mod fade;
 mod fit;
-mod integral;
 mod model;
 mod noise;
-mod noise_search;
-mod pass;
 mod positions;
 mod run_data;
 mod run_scatter;
@@ -31,11 +27,9 @@ pub use criterion::{
     CERTAIN_STDS, CERTAIN_STDS_BY_RUN, EQUAL, NULL_SCORE, NullScore, OUTSIDE_COST, SCORE_MIN,
     acceptance_score, p_value,
 };
-pub use fade::Fade;
 pub use fit::{Fit, FitProblem, Positions, RunNormal, RunPositions};
 pub use model::{UpdatedForces, UpdatedModel};
-pub use noise::{Noise, RunScatter};
-pub use noise_search::{RUNS_A_TASK, coarse_step};
+pub use noise::{Fade, Noise, RUNS_A_TASK, RunScatter, coarse_step};
 pub use run_data::{Density, RunData, RunDataError, RunPower, prepare, prepare_at};
 pub use run_scatter::{PRIOR_RUNS, RunFactors, WeightedFilter};
 pub use sample_forces::SampleForces;

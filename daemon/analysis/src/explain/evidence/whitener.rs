@@ -6,8 +6,7 @@ use std::sync::Arc;
 use nalgebra::{Matrix2, Vector2};
 
 use super::bins::Bin;
-use super::fade::{Fade, SAME_STEP_S};
-use super::noise::Noise;
+use super::noise::{Fade, Noise, SAME_STEP_S};
 use super::run_data::RunData;
 use dynocar_core::filter::Gaussian;
 

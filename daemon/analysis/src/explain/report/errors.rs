@@ -5,11 +5,11 @@ use dynocar_model::simulate::{Restart, SpeedError};
 use super::IntervalEstimate;
 use crate::dataset::Role;
 use crate::explain::Explanation;
-use crate::explain::bootstrap::intervals_95;
 use crate::explain::evidence::{Fit, RunData};
 use crate::explain::score::{self, pooled, predicted, run_error};
 use crate::explain::stop_to_stop::Judged;
 use crate::explain::stop_to_stop::StopToStop;
+use crate::statistics::intervals_95;
 
 /// Length in s of the blocks of a single run.
 const BLOCK_S: f64 = 60.0;

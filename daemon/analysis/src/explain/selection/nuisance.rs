@@ -10,12 +10,11 @@ use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::acceptance::{
-    CERTAIN_RUNS_MIN, is_certain, is_left_by_moved_places, is_material, is_possible, moves_places,
+    CERTAIN_RUNS_MIN, Refusal, at_bound, is_certain, is_left_by_moved_places, is_material,
+    is_possible, moves_places, penalty,
 };
 use super::by_run::{Deviations, deviations, deviations_with_nuisance};
 use super::outcome::{EffectTrial, NuisanceFit, SearchOutcome, round_of};
-use super::price::{at_bound, penalty};
-use super::refusal::Refusal;
 use super::search::Search;
 use super::trying::{Asked, PROMISE_TIMES};
 use crate::explain::effects::{
@@ -23,8 +22,7 @@ use crate::explain::effects::{
     usual_errors, vertical_curves,
 };
 use crate::explain::evidence::Fit;
-use crate::explain::places::SURVEYED;
-use crate::explain::places::span_m;
+use crate::explain::places::{SURVEYED, span_m};
 
 /// Returns whether some evidence makes the last effect of a trial certain jointly with the usual errors.
 pub fn is_certain_with_nuisance(trial: &EffectTrial, evidence: f64) -> bool {

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 
+use super::acceptance::Refusal;
 use super::by_run::deviations_with_nuisance;
-use super::refusal::Refusal;
 use crate::explain::effects::SharedHypothesis;
 use crate::explain::evidence::{Fit, acceptance_score};
 use crate::statistics::rms;

@@ -4,10 +4,9 @@ use std::sync::{Mutex, PoisonError};
 
 use dynocar_shared::vocabulary::EffectKind;
 
+use super::acceptance::{discounted, penalty};
 use super::outcome::EffectTrial;
-use super::price::{discounted, penalty};
-use super::search::RoundSteps;
-use super::search::Search;
+use super::search::{RoundSteps, Search};
 use crate::explain::effects::{Candidate, Effect, LIBRARY, UNKNOWN};
 use crate::explain::evidence::{Fit, Noise};
 use crate::explain::scan::Scan;

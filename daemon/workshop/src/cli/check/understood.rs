@@ -9,7 +9,7 @@ use dynocar::dataset::FileKind;
 use dynocar::output::{report_line, write_in_folder};
 use dynocar_analysis::dataset::dataset_diagnostic::diagnostics;
 use dynocar_analysis::dataset::{DatasetDiagnostic, DatasetError, Manifest, Run};
-use dynocar_analysis::explain::report::residual_line::AlongLine;
+use dynocar_analysis::explain::report::windows::AlongLine;
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 

@@ -1,7 +1,7 @@
 //! Fitted values, the places of the effects, and the other explanations that were considered.
 
+use dynocar_analysis::explain::caveats::not_held;
 use dynocar_analysis::explain::evidence::SCORE_MIN;
-use dynocar_analysis::explain::identifiability::not_held;
 use dynocar_analysis::explain::report::candidates::CandidateRow;
 use dynocar_analysis::explain::report::parameters::{ParameterRow, PlaceRow, PlaceRuns};
 use dynocar_model::words::{joined, number};

@@ -10,12 +10,12 @@ use std::sync::Arc;
 use dynocar_model::terms::brake::{self, BUILD_UP_S, build_up};
 use dynocar_shared::vocabulary::EffectKind;
 
-use self::onsets::{GRID_MIN_S, TAIL_MIN_S, by_speed, onset_tuple};
+use self::onsets::{GRID_MIN_S, TAIL_MIN_S, by_pressure, by_speed, onset_tuple};
 use super::{Candidate, Certainty, Hypothesis, Nature, On, Policy, Proposal, SharedHypothesis};
 use crate::explain::answer::{Location, RunWindow};
 use crate::explain::evidence::SampleForces;
 use crate::explain::places::{Axis, IntervalEnd, Reach};
-use crate::explain::residual_pressure;
+
 use crate::explain::scan::{Scan, Tuple};
 
 /// Number of dragging brakes that hardly have the same time since departure in most runs by chance.
@@ -47,7 +47,7 @@ pub fn propose(scan: &Scan) -> Proposal {
     let mut candidates = Vec::new();
     let runs = &scan.problem.runs;
     let fit_runs = runs.len();
-    let by_pressure = residual_pressure::windows(runs.iter().chain(scan.holdout));
+    let by_pressure = by_pressure(runs.iter().chain(scan.holdout));
     let fitted = |windows: &[RunWindow]| {
         windows.iter().any(|window| runs.iter().any(|run| run.file == window.run))
     };

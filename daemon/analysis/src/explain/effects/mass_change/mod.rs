@@ -2,7 +2,6 @@
 //! a run. The mass changes only while the train stands.
 
 mod masses;
-mod parts;
 
 use std::sync::Arc;
 
@@ -14,8 +13,7 @@ use crate::explain::hypothesis::SharedHypothesis;
 use crate::explain::places::span_m;
 use crate::explain::scan::{Scan, Tuple};
 use crate::parallel;
-use masses::Masses;
-use parts::{Along, FactorPart, STATION_M, STOP_MIN_S, stations, stops};
+use masses::{Along, FactorPart, Masses, STATION_M, STOP_MIN_S, stations, stops};
 
 /// Greatest number of sections or windows.
 const PARTS_MAX: usize = 5;

@@ -3,10 +3,9 @@
 //!
 //! - [`grammar`]: the forms that are tried; [`known`]: the values of a covariate; [`shape`]: the gain of a form
 //! - [`form`]: a force of such a form, of which some numbers are estimated
-//! - [`band`]: a force in a range of a covariate ([`band_axis`])
+//! - [`band`]: a force in a range of a covariate
 
 mod band;
-mod band_axis;
 mod form;
 mod grammar;
 mod known;
