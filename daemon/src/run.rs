@@ -21,11 +21,12 @@ use tracing::{info, warn};
 use super::runtime::system::{
     STACK_BYTES, lock_all_memory, pin_to_core, prefault_stack, raise_open_files, set_fifo_priority,
 };
-use crate::config::{DaemonConfig, IdleStrategy, ModelsConfig, ThreadConfig};
+use crate::config::{
+    DaemonConfig, IdleStrategy, ModelsConfig, SettingRefused, ThreadConfig, build_pipeline,
+};
 use crate::ending::{self, EndingError};
 use crate::models::Store;
 use crate::observing::ObservedTrain;
-use crate::pipelines::{SettingRefused, build_pipeline};
 use crate::runtime::exchange::Exchange;
 use crate::runtime::main_thread::{RuntimeWatch, WatchedPipeline};
 use crate::runtime::worker::{ChannelPlan, PipelineReport, Worker, WorkerPlan};
@@ -95,7 +96,7 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
     let workers = start_workers(plans)?;
     let shadow = shadow
         .map(|(trains, models)| {
-            shadow::thread::start(trains, models, host.clone(), board.clone(), Arc::clone(&stop))
+            shadow::start(trains, models, host.clone(), board.clone(), Arc::clone(&stop))
         })
         .transpose()
         .map_err(|source| RunError::System { what: "thread of models on trial", source })?;

@@ -10,8 +10,8 @@ use dynocar::models::{
     Origin, Store, TrainModels, UtcSecond,
 };
 use dynocar::shadow::record::{TrialRecord, TriedModel};
+use dynocar_core::trial::Ledger;
 use dynocar_core::trial::evidence::RivalEvidence;
-use dynocar_core::trial::ledger::Ledger;
 use dynocar_model::simulate::SpeedError;
 use dynocar_shared::TrainId;
 use dynocar_tests::browser::Browser;

@@ -14,11 +14,8 @@
 mod about;
 mod calls;
 mod channel;
-mod ends;
 mod recorded;
 mod snapshot;
-mod stopping;
-mod table;
 
 use pyo3::prelude::*;
 
@@ -32,13 +29,13 @@ mod _native {
     #[pymodule_export]
     use crate::channel::{Publisher, Reader};
     #[pymodule_export]
+    use crate::recorded::{Column, Table};
+    #[pymodule_export]
     use crate::recorded::{Explained, explain};
     #[pymodule_export]
     use crate::recorded::{check, identify, read};
     #[pymodule_export]
+    use crate::snapshot::stopping_estimate;
+    #[pymodule_export]
     use crate::snapshot::{ParameterSnapshot, Reading, dtypes};
-    #[pymodule_export]
-    use crate::stopping::stopping_estimate;
-    #[pymodule_export]
-    use crate::table::{Column, Table};
 }

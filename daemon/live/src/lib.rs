@@ -19,5 +19,4 @@
 //! ```
 
 pub mod cli;
-pub mod live;
 pub mod viewers;

@@ -2,8 +2,7 @@
 
 use dynocar_shared::PipelineKind;
 
-use super::error::Checker;
-use super::{ConfigError, PipelineConfig, ThreadConfig};
+use super::{Checker, ConfigError, PipelineConfig, ThreadConfig};
 
 /// The name of a thread that is proposed for slow pipelines.
 const SLOW: &str = "slow";

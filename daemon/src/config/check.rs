@@ -1,4 +1,4 @@
-//! Checks the text of a configuration and makes a [`DaemonConfig`] of it.
+//! A whole configuration, checked from its text.
 
 use std::collections::HashSet;
 use std::net::SocketAddr;
@@ -6,20 +6,83 @@ use std::path::Path;
 use std::sync::Arc;
 
 use dynocar_estimators::EstimatorSettings;
+use dynocar_model::track::Track;
+use dynocar_model::train::TrainModel;
 use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::{PipelineKind, TrainId};
 
-use super::error::Checker;
-use super::raw::{
-    RawConfig, RawMetrics, RawModels, RawPipeline, RawQuantities, RawThread, RawTrain,
-};
+use super::quantities::Answers;
 use super::{
-    Answers, ConfigError, DaemonConfig, IdleStrategy, ModelsConfig, PipelineConfig, StateConfig,
-    ThreadConfig, TrainConfig, apart,
+    Checker, ConfigError, IdleStrategy, ModelsConfig, PipelineConfig, ProcessConfig, RawConfig,
+    RawMetrics, RawModels, RawPipeline, RawQuantities, RawThread, RawTrain, StateConfig,
+    ThreadConfig, apart,
 };
-use crate::dataset::LoadError;
+use crate::dataset::{LoadError, read_text};
 use crate::models::{ModelHash, ModelText};
 use crate::shadow::rule::Rule;
+
+/// A train that the daemon serves.
+#[derive(Clone, Debug)]
+pub struct TrainConfig {
+    /// Its number on the channels.
+    pub id: TrainId,
+    /// Declared model.
+    pub model: Arc<TrainModel>,
+    /// The line it runs on, when known.
+    pub track: Option<Arc<Track>>,
+    /// Hash that identifies the model of train and line.
+    pub model_hash: ModelHash,
+    /// Text of the declared model, as its files spell it.
+    pub text: ModelText,
+    /// The models to be tried next to the one in force; those of the store when absent.
+    pub candidates: Option<Vec<ModelHash>>,
+    /// Set of wheels that the train runs on; estimates are not kept across a change. Empty when not given.
+    pub wheel_set: String,
+    /// The pipelines that answer a controller's questions, each by its number.
+    pub answers: Answers,
+}
+
+/// A configuration, checked as a whole.
+#[derive(Clone, Debug)]
+pub struct DaemonConfig {
+    /// The process.
+    pub process: ProcessConfig,
+    /// The trains.
+    pub trains: Vec<TrainConfig>,
+    /// The threads.
+    pub threads: Vec<ThreadConfig>,
+    /// Loopback address that hands out metrics; none when absent.
+    pub metrics: Option<SocketAddr>,
+    /// Estimates that outlive the daemon; none are kept when absent.
+    pub state: Option<StateConfig>,
+    /// The store of models; without it the declared model stays in force.
+    pub models: Option<ModelsConfig>,
+    /// The pipelines, by the number that their snapshots carry.
+    pub pipelines: Vec<PipelineConfig>,
+}
+
+impl DaemonConfig {
+    /// Reads and checks a configuration and the train and track files it names.
+    ///
+    /// # Errors
+    ///
+    /// See [`ConfigError`]; every message names the file and the expected value.
+    pub fn load(path: &Path) -> Result<Self, ConfigError> {
+        let text = read_text(path)
+            .map_err(|problem| ConfigError::Unreadable { path: path.into(), problem })?;
+        DaemonConfig::from_text(path, &text)
+    }
+
+    /// Checks the text of a configuration, and the train and track files it names; `path` is the
+    /// file it came from.
+    ///
+    /// # Errors
+    ///
+    /// See [`ConfigError`].
+    pub fn from_text(path: &Path, text: &str) -> Result<Self, ConfigError> {
+        check(path, text)
+    }
+}
 
 /// The most pipeline threads that one sample channel serves.
 const THREADS_MAX: usize = 10;

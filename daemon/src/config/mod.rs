@@ -2,46 +2,363 @@
 //!
 //! Unknown keys are refused; a value outside its range is refused with key, value and range.
 //! File names inside the configuration are relative to the configuration file.
+//!
+//! Refusals of a value by a configuration, with reasons.
+//!
+//! The parts of a configuration: process, threads, pipelines, kept states.
+//!
+//! The shape of a configuration's text, before anything is checked.
+//!
+//! The pipelines of a configuration.
 
 mod apart;
 mod check;
-mod error;
-mod parts;
 mod quantities;
-mod raw;
-mod whole;
 
 pub use apart::is_slow;
-pub use error::ConfigError;
-pub use parts::{
-    IdleStrategy, LogFormat, ModelsConfig, PipelineConfig, ProcessConfig, StateConfig, ThreadConfig,
-};
+pub use check::{DaemonConfig, TrainConfig};
 pub use quantities::Answers;
-pub use whole::{DaemonConfig, TrainConfig};
 
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use crate::dataset::read_text;
+use dynocar_core::pipeline::{Pipeline, SettingError};
+use dynocar_dataset::FileProblem;
+use dynocar_estimators::EstimatorSettings;
+use dynocar_shared::TrainId;
+use serde::Deserialize;
 
-impl DaemonConfig {
-    /// Reads and checks a configuration and the train and track files it names.
-    ///
-    /// # Errors
-    ///
-    /// See [`ConfigError`]; every message names the file and the expected value.
-    pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        let text = read_text(path)
-            .map_err(|problem| ConfigError::Unreadable { path: path.into(), problem })?;
-        DaemonConfig::from_text(path, &text)
+use crate::shadow::rule::{Adopt, Rule};
+
+/// Why a configuration is refused.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// The file's text cannot be read.
+    #[error("{path}: {problem}")]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        problem: FileProblem,
+    },
+    /// The file is no TOML, or has a key or type that is not expected.
+    #[error("{path}: {message}")]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// Message of the reader, with the line.
+        message: String,
+    },
+    /// A value lies outside its range.
+    #[error("{path}: {key} = {value}: expected {allowed}")]
+    OutOfRange {
+        /// The file.
+        path: PathBuf,
+        /// The key, with its table.
+        key: String,
+        /// The value it was given.
+        value: String,
+        /// The allowed range, in words.
+        allowed: String,
+    },
+    /// A train or track file is wrong; the message names it.
+    #[error(transparent)]
+    Model(#[from] crate::dataset::LoadError),
+}
+
+/// Names the configuration's file in every refusal.
+pub(super) struct Checker<'a> {
+    pub path: &'a Path,
+}
+
+impl Checker<'_> {
+    /// Returns the folder to which file names in the configuration are relative.
+    pub fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new("."))
     }
 
-    /// Checks the text of a configuration, and the train and track files it names; `path` is the
-    /// file it came from.
-    ///
-    /// # Errors
-    ///
-    /// See [`ConfigError`].
-    pub fn from_text(path: &Path, text: &str) -> Result<Self, ConfigError> {
-        check::check(path, text)
+    pub fn refuse<T>(
+        &self,
+        key: impl Into<String>,
+        value: impl ToString,
+        allowed: impl Into<String>,
+    ) -> Result<T, ConfigError> {
+        Err(ConfigError::OutOfRange {
+            path: self.path.into(),
+            key: key.into(),
+            value: value.to_string(),
+            allowed: allowed.into(),
+        })
     }
+
+    pub fn range(&self, key: &str, value: u64, low: u64, high: u64) -> Result<u64, ConfigError> {
+        if (low..=high).contains(&value) {
+            return Ok(value);
+        }
+        self.refuse(key, value, format!("a whole number from {low} to {high}"))
+    }
+}
+
+/// Behaviour of a pipeline thread while no sample comes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum IdleStrategy {
+    /// Polls for samples without pause: lowest latency, one whole core.
+    Busy,
+    /// Polls for a while, then sleeps until the controller wakes it.
+    Adaptive,
+    /// Sleeps at once: least processor time.
+    Event,
+}
+
+impl std::fmt::Display for IdleStrategy {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            IdleStrategy::Busy => "busy",
+            IdleStrategy::Adaptive => "adaptive",
+            IdleStrategy::Event => "event",
+        })
+    }
+}
+
+/// How the daemon writes its log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LogFormat {
+    /// Lines for people.
+    Text,
+    /// One JSON object a line.
+    Json,
+}
+
+/// The process: the table `[daemon]`.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ProcessConfig {
+    /// Run-time directory; the environment's when absent.
+    pub root: Option<PathBuf>,
+    /// Level of the log, as `info` or `dynocar=debug`.
+    pub log: String,
+    /// Form of the log.
+    pub log_format: LogFormat,
+    /// Idle strategy of the threads that do not set their own.
+    pub idle: IdleStrategy,
+    /// How long an adaptive thread looks for samples before it sleeps, in µs.
+    pub spin_us: u64,
+    /// How often a snapshot is vouched for while no sample comes, in ms.
+    pub heartbeat_ms: u64,
+    /// Keeps all memory of the daemon resident, so that no thread waits for a page.
+    pub lock_memory: bool,
+}
+
+impl Default for ProcessConfig {
+    fn default() -> Self {
+        ProcessConfig {
+            root: None,
+            log: "info".into(),
+            log_format: LogFormat::Text,
+            idle: IdleStrategy::Adaptive,
+            spin_us: 2_000,
+            heartbeat_ms: 50,
+            lock_memory: false,
+        }
+    }
+}
+
+/// Where and how estimates are kept over restarts.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct StateConfig {
+    /// Whether they are.
+    pub keep: bool,
+    /// Directory of the state files; the usual one of the service or user when absent.
+    pub directory: Option<PathBuf>,
+    /// How often they are written, in s.
+    pub interval_s: u64,
+    /// An older estimate is not taken up, in h.
+    pub age_max_h: u64,
+}
+
+impl Default for StateConfig {
+    fn default() -> Self {
+        StateConfig {
+            keep: true,
+            directory: None,
+            interval_s: default_interval_s(),
+            age_max_h: 7 * 24,
+        }
+    }
+}
+
+/// Returns the interval in s at which the states that outlive the daemon are written.
+pub(super) const fn default_interval_s() -> u64 {
+    30
+}
+
+/// The store of models, and the treatment of models on trial.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelsConfig {
+    /// The store's directory.
+    pub directory: PathBuf,
+    /// When a model is adopted or taken back.
+    pub rule: Rule,
+    /// The most candidates of a train that are on trial at once.
+    pub candidates_max: usize,
+    /// Processor core of the thread that tries them.
+    pub core: Option<usize>,
+    /// How often the trials are written down, in s.
+    pub interval_s: u64,
+}
+
+/// A thread that serves pipelines.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ThreadConfig {
+    /// Name, also shown by the operating system.
+    pub name: String,
+    /// Processor core that it is bound to.
+    pub core: Option<usize>,
+    /// Idle strategy of the thread.
+    pub idle: IdleStrategy,
+    /// Real-time priority (`SCHED_FIFO`), 1 to 99; the system's ordinary scheduling when absent.
+    pub priority: Option<u8>,
+}
+
+/// A pipeline: one estimator for each of its trains.
+#[derive(Clone, Debug)]
+pub struct PipelineConfig {
+    /// Name for people.
+    pub name: String,
+    /// Kind and settings of the estimator.
+    pub estimator: EstimatorSettings,
+    /// Index of its thread in [`DaemonConfig::threads`].
+    pub thread: usize,
+    /// The trains it serves.
+    pub trains: Vec<TrainId>,
+}
+
+/// A configuration's text, before anything is checked.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct RawConfig {
+    daemon: ProcessConfig,
+    trains: Vec<RawTrain>,
+    threads: Vec<RawThread>,
+    pipelines: Vec<RawPipeline>,
+    quantities: RawQuantities,
+    state: StateConfig,
+    metrics: Option<RawMetrics>,
+    models: Option<RawModels>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawMetrics {
+    listen: String,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawTrain {
+    id: u64,
+    file: PathBuf,
+    track: Option<PathBuf>,
+    #[serde(default)]
+    wheel_set: String,
+    #[serde(default)]
+    quantities: RawQuantities,
+    candidates: Option<Vec<String>>,
+}
+
+/// Name of the pipeline that answers, by the quantity's name.
+type RawQuantities = BTreeMap<String, String>;
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawModels {
+    directory: PathBuf,
+    #[serde(default = "default_adopt")]
+    adopt: Adopt,
+    #[serde(default = "default_least_gain")]
+    least_gain: f64,
+    #[serde(default = "default_trips_between_mistakes")]
+    trips_between_mistakes: f64,
+    #[serde(default = "default_candidates_max")]
+    candidates_max: u64,
+    #[serde(default = "default_interval_s")]
+    interval_s: u64,
+    core: Option<usize>,
+    #[serde(default)]
+    bounds: BTreeMap<String, [f64; 2]>,
+}
+
+const fn default_adopt() -> Adopt {
+    Adopt::Ask
+}
+
+const fn default_least_gain() -> f64 {
+    0.1
+}
+
+/// Twenty years of twenty-seven trips a day.
+const fn default_trips_between_mistakes() -> f64 {
+    200_000.0
+}
+
+const fn default_candidates_max() -> u64 {
+    2
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawThread {
+    name: String,
+    core: Option<usize>,
+    idle: Option<IdleStrategy>,
+    priority: Option<u64>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawPipeline {
+    name: Option<String>,
+    kind: String,
+    thread: Option<String>,
+    trains: Option<Vec<u64>>,
+    #[serde(default)]
+    settings: toml::Table,
+}
+
+/// A setting of a pipeline is out of range.
+#[derive(Debug, thiserror::Error)]
+#[error("pipelines.{pipeline}.settings.{source}")]
+pub struct SettingRefused {
+    /// The pipeline's name.
+    pub pipeline: String,
+    /// Key, value and range.
+    pub source: SettingError,
+}
+
+/// Returns a pipeline of the configuration for one of its trains, before its first sample; `index` is its
+/// number in the configuration.
+///
+/// # Errors
+///
+/// When a setting is out of range.
+pub fn build_pipeline(
+    settings: &PipelineConfig,
+    index: u32,
+    train: &TrainConfig,
+) -> Result<Pipeline, SettingRefused> {
+    let estimator = settings
+        .estimator
+        .build(&train.model)
+        .map_err(|source| SettingRefused { pipeline: settings.name.clone(), source })?;
+    let (model, track) = (Arc::clone(&train.model), train.track.clone());
+    let mut pipeline = Pipeline::new(train.id, index, model, track, estimator);
+    let snapshot = pipeline.snapshot_mut();
+    snapshot.quantities = train.answers.bits_of(index as usize);
+    snapshot.train_quantities = train.answers.all_bits();
+    snapshot.model_hash = train.model_hash.0;
+    Ok(pipeline)
 }

@@ -3,8 +3,8 @@
 use dynocar_model::named;
 use serde::{Deserialize, Serialize};
 
-use super::moment::UtcSecond;
 use super::text::ModelHash;
+use crate::stamp::UtcSecond;
 
 named! {
     /// Decision on a model.

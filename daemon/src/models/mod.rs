@@ -23,19 +23,16 @@
 //! - [`difference`]: the keys in which two models differ
 
 pub mod decision;
-pub mod difference;
-mod error;
 pub mod history;
-pub mod moment;
 pub mod numbered;
 pub mod origin;
 pub mod store;
 pub mod text;
 
+pub use crate::stamp::UtcSecond;
 pub use decision::{Action, Decision, NewDecision};
-pub use error::ModelsError;
 pub use history::{ModelHistory, State};
-pub use moment::UtcSecond;
+pub use numbered::ModelsError;
 pub use origin::{FoundEffect, MaintenanceEvent, ModelFigure, Origin};
 pub use store::{Listing, NewModel, Store, Stored, TrainModels};
 pub use text::{ModelHash, ModelText};

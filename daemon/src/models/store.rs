@@ -9,11 +9,10 @@ use dynocar_model::train::TrainModel;
 use dynocar_shared::TrainId;
 
 use super::decision::{Action, Decision, ModelChoice, NewDecision, in_force_after};
-use super::error::ModelsError;
-use super::moment::UtcSecond;
-use super::numbered::{self, Numbered, names_in, read_record, text_of};
+use super::numbered::{self, ModelsError, Numbered, names_in, read_record, text_of};
 use super::origin::{MaintenanceEvent, Origin};
 use super::text::{ModelHash, ModelText, TRACK_FILE, TRAIN_FILE};
+use crate::stamp::UtcSecond;
 use crate::storage::{Disk, Storage, make_once, part_of};
 
 /// Where a model came from, in its folder.

@@ -10,7 +10,6 @@
 //! - [`main_thread`]: the work of the main thread: signals, peers, the log
 
 pub mod exchange;
-pub mod idle;
 pub mod log_details;
 pub mod main_thread;
 pub mod status_log;

@@ -1,21 +1,24 @@
-//! The command line of `dynocar watch`.
+//! The command line of `dynocar watch`, and lines where there is no terminal: one a second for each train.
 
-use std::io::IsTerminal;
+use std::io::{ErrorKind, IsTerminal, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use clap::{CommandFactory, Parser};
 use dynocar::cli::{Failure, carry_out};
 use dynocar::config::DaemonConfig;
 use dynocar::ending::ProgramEnding;
 use dynocar::observing::ObservedSelection;
-use dynocar::redrawn::can_draw;
+use dynocar::output::{OutputError, can_draw, is_utf8};
 use dynocar_shared::TrainId;
 use dynocar_transport::Host;
 
+use crate::state::TrainState;
+use crate::terminal;
 use crate::watcher::Watcher;
-use crate::{plain, terminal};
+use crate::words::{daemon, residual, rows, samples};
 
 /// Show in the terminal the estimates of a train, and which manoeuvre to drive next.
 ///
@@ -57,7 +60,7 @@ fn execute(arguments: &Arguments) -> Result<(), Failure> {
         .map_err(|error| Failure::Work(format!("watching for the end: {error}")))?;
     let mut watcher = Watcher::new(ObservedSelection { host, trains }, config);
     if arguments.plain || !std::io::stdout().is_terminal() || !can_draw() {
-        return plain::run(&mut watcher, &ending);
+        return print_lines(&mut watcher, &ending);
     }
     let has_colour = std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
     terminal::run(&mut watcher, &ending, has_colour)
@@ -79,4 +82,76 @@ fn wanted(arguments: &Arguments, config: Option<&DaemonConfig>) -> Result<Vec<Tr
             Err(Failure::Input(format!("--train {id}: the configuration has train {known}")))
         }
     }
+}
+
+/// Time between two polls for snapshots.
+const POLL_EVERY: Duration = Duration::from_millis(100);
+/// Time between two writings.
+const WRITE_EVERY: Duration = Duration::from_secs(1);
+
+/// Writes lines until the program is to end, or until nobody reads them any more.
+///
+/// # Errors
+///
+/// When standard output cannot be written.
+fn print_lines(watcher: &mut Watcher, ending: &ProgramEnding) -> Result<(), Failure> {
+    // The first poll takes the snapshots that are there; a heartbeat brings them.
+    let mut next = Instant::now() + WRITE_EVERY / 2;
+    while !ending.is_due() {
+        watcher.look();
+        if Instant::now() >= next {
+            next += WRITE_EVERY;
+            let mut text: String =
+                watcher.trains().into_iter().map(|train| line(train) + "\n").collect();
+            if text.is_empty() {
+                text = format!("no daemon serves any train under {}\n", watcher.place());
+            }
+            if std::io::stdout().is_terminal() && !is_utf8() {
+                text = in_ascii(&text);
+            }
+            let mut output = std::io::stdout().lock();
+            match output.write_all(text.as_bytes()).and_then(|()| output.flush()) {
+                Err(error)
+                    if error.kind() == ErrorKind::BrokenPipe || ending.is_terminal_gone() =>
+                {
+                    return Ok(());
+                }
+                Err(error) => return Err(OutputError::StandardOutput(error).into()),
+                Ok(()) => {}
+            }
+        }
+        std::thread::sleep(POLL_EVERY);
+    }
+    Ok(())
+}
+
+/// Returns the text for a terminal that knows no other letters.
+fn in_ascii(text: &str) -> String {
+    let letters =
+        text.replace('±', "+-").replace('…', "...").replace('‰', "o/oo").replace('²', "2");
+    letters.chars().map(|it| if it.is_ascii() { it } else { '?' }).collect()
+}
+
+/// Returns a train in a line.
+pub fn line(train: &TrainState) -> String {
+    let mut parts = vec![daemon(&train.daemon, None)];
+    for row in rows(train, &[0.5]) {
+        let words = [row.label.trim(), &row.number, &row.interval, row.unit];
+        let value = words.into_iter().filter(|it| !it.is_empty()).collect::<Vec<_>>().join(" ");
+        let state = match row.use_state {
+            Some(state) if row.why.is_empty() => format!(" {state}"),
+            Some(state) => format!(" {state} ({})", row.why),
+            None => String::new(),
+        };
+        parts.push(value + &state);
+    }
+    if !train.pipelines.is_empty() {
+        parts.extend(
+            residual(train)
+                .map(|(force, suspect)| format!("unexplained {force}, suspect {suspect}")),
+        );
+        parts.push(samples(train));
+        parts.extend(train.advice.first().map(|advice| format!("next: {advice}")));
+    }
+    format!("train {}: {}", train.id, parts.join("; "))
 }

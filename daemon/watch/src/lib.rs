@@ -21,9 +21,7 @@
 //! assert!(command.try_get_matches_from(["program", "--no-such-option"]).is_err());
 //! ```
 
-pub mod advisor;
 pub mod cli;
-pub mod plain;
 pub mod screen;
 pub mod state;
 pub mod terminal;

@@ -30,7 +30,7 @@ use dynocar_model::train::TrainModel;
 use dynocar_shared::PipelineKind;
 
 use self::settings::{KalmanSettings, LsSettings, MilsSettings, RlsSettings};
-use crate::liu::solver::Solver;
+use crate::liu::Solver;
 
 /// Regularised least squares over all rows (Liu 2018, eq. 7).
 ///

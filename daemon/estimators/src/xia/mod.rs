@@ -5,7 +5,6 @@
 //! - [`newton`]: the pipeline, with the paper's search or with our own
 //! - [`trajectory`]: our own method, over windows and sample by sample
 
-pub mod deviation;
 pub mod newton;
 pub mod trajectory;
 pub mod window;

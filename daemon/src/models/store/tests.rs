@@ -1,6 +1,6 @@
-use super::super::moment::UtcSecond;
 use super::super::origin::{FoundEffect, ModelFigure};
 use super::*;
+use crate::stamp::UtcSecond;
 
 const TRAIN: &str = "[train]\nmass_t=100\nlength_m=80\nrotating_mass_factor=0.05\n\
     [resistance]\na=1\nb=0\nc=0\n";

@@ -22,7 +22,6 @@ mod search;
 pub mod step;
 #[cfg(test)]
 mod test_runs;
-mod unit_disturbance;
 
 /// Davis a.
 pub const A: usize = 0;
