@@ -1,10 +1,5 @@
 //! Observation of trains, in one vocabulary for all observers: arrivals and departures, and changes in the answers
 //! of the pipelines. An observer is one reader of each train's snapshots, as every client is.
-//!
-//! - `train`: one train, and the kinds of events
-//!
-//! One train as an observer sees it: who serves and drives it, the reader of its snapshots, the state of its pipelines,
-//! and the kinds of events.
 
 use dynocar_client::{Reading, SnapshotReader};
 use dynocar_shared::services::PIPELINES_MAX;

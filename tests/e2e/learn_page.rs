@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::process::Command;
 
-use dynocar::models::decision::ModelChoice;
 use dynocar::models::origin::{EventWindow, HeldOutError};
+use dynocar::models::records::ModelChoice;
 use dynocar::models::{
     FoundEffect, MaintenanceEvent, ModelFigure, ModelHash, ModelText, NewDecision, NewModel,
     Origin, Store, TrainModels, UtcSecond,

@@ -1,6 +1,4 @@
-//! Publisher and reader as Python holds them.
-//!
-//! Ends of channels, each kept in the thread that opened it.
+//! Publisher and reader as Python holds them, each end kept in the thread that opened it.
 //!
 //! The transport's ports belong to one thread, and Python hands its objects from thread to thread. Therefore an object
 //! holds only a number, under which the end lies in a list of its own thread. Another thread that uses the object is

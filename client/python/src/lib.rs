@@ -3,13 +3,11 @@
 //!
 //! # Layout
 //!
-//! - [`ends`]: ends of channels, each kept in the thread that opened it
-//! - [`channel`]: publisher and reader, [`snapshot`]: results of a reader
-//! - [`stopping`]: braking distance and time with a bound
+//! - [`channel`]: publisher and reader, each kept in the thread that opened it
+//! - [`snapshot`]: results of a reader; braking distance and time with a bound
 //! - [`about`]: clock, versions, who serves a train, vocabularies
 //! - [`calls`]: failures as the exceptions of `dynocar/_errors.py`; long work that Ctrl-C ends
-//! - [`recorded`]: `check`, `read`, `identify`, `explain`
-//! - [`table`]: columns for NumPy, tables for Arrow
+//! - [`recorded`]: `check`, `read`, `identify`, `explain`; columns for NumPy, tables for Arrow
 
 mod about;
 mod calls;

@@ -1,6 +1,4 @@
-//! The command line of `dynocar live`.
-//!
-//! Reads the channels and serves viewers until it is asked to end.
+//! The command line of `dynocar live`, and its work: it reads the channels and serves viewers until it is asked to end.
 
 use std::net::{IpAddr, SocketAddr};
 use std::process::ExitCode;

@@ -373,6 +373,4 @@ impl Unit {
 }
 
 #[cfg(test)]
-mod spelling_tests;
-#[cfg(test)]
 mod tests;

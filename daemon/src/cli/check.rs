@@ -1,6 +1,5 @@
-//! `dynocar check` of a daemon's configuration; the workshop checks all other files.
-//!
-//! A daemon configuration in words: its trains, estimators and threads.
+//! `dynocar check` of a daemon's configuration: its trains, estimators and threads in words. The workshop checks all
+//! other files.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

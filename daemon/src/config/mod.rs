@@ -3,13 +3,12 @@
 //! Unknown keys are refused; a value outside its range is refused with key, value and range.
 //! File names inside the configuration are relative to the configuration file.
 //!
-//! Refusals of a value by a configuration, with reasons.
+//! # Layout
 //!
-//! The parts of a configuration: process, threads, pipelines, kept states.
-//!
-//! The shape of a configuration's text, before anything is checked.
-//!
-//! The pipelines of a configuration.
+//! - here: the parts of a configuration, as checked and as the text has them; refusals; a pipeline from its settings
+//! - `check`: from the text to a [`DaemonConfig`]
+//! - `quantities`: the pipeline that answers each of a controller's questions
+//! - `apart`: a thread of their own for slow pipelines
 
 mod apart;
 mod check;

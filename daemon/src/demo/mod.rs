@@ -2,8 +2,7 @@
 //!
 //! A controller process replays an embedded recorded run into shared memory, a daemon process
 //! estimates, and this process is the client that polls each control cycle.
-//!
-//! The live view: one line for each pipeline, a progress bar of the samples; plain lines without a terminal.
+//! The live view has one line for each pipeline and a progress bar of the samples; plain lines without a terminal.
 
 mod stage;
 mod summary;

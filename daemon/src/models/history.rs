@@ -5,8 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use dynocar_model::named;
 use toml::{Table, Value};
 
-use super::decision::{Action, Decision};
-use super::numbered::{ModelsError, Numbered};
+use super::records::{Action, Decision, ModelsError, Numbered};
 use super::store::{Listing, Stored, TrainModels};
 use super::text::{ModelHash, ModelText, TRACK_FILE, TRAIN_FILE};
 

@@ -13,8 +13,8 @@ use dynocar_transport::channel::SampleCount;
 use dynocar_transport::{Announcement, ChannelError, Host, Peer, Role, monotonic_now_ns};
 use tracing::{info, warn};
 
-use super::status_log::{RefusalLog, StatusAndReason, StatusLog};
 use super::worker::PipelineReport;
+use crate::log::{RefusalLog, StatusAndReason, StatusLog};
 use crate::observing::ObservedTrain;
 use crate::operator::{Suspicion, refusals, refused_words};
 use crate::supervision::health::Verdict;

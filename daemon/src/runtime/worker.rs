@@ -1,6 +1,4 @@
-//! A pipeline thread, from sample to snapshot.
-//!
-//! Idle strategies of a pipeline thread.
+//! A pipeline thread, from sample to snapshot, and its idle strategies.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

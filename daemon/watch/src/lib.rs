@@ -4,14 +4,12 @@
 //!
 //! # Layout
 //!
-//! - [`cli`]: the command line
+//! - [`cli`]: the command line; keys, signals, and a terminal left as it was; lines where there is no terminal
 //! - [`watcher`]: the observed trains, and the state of each that is shown
-//! - [`state`]: the shown state of a train and its last minutes, without any clock or channel
-//! - [`advisor`]: advice on the next manoeuvre, now and then
+//! - [`state`]: the shown state of a train and its last minutes, without any clock or channel; advice on the next
+//!   manoeuvre
 //! - [`words`]: numbers with intervals and units, a train's lines
 //! - [`screen`]: the screen, drawn from a [`state`]
-//! - [`plain`]: lines where there is no terminal
-//! - [`terminal`]: keys, signals, and a terminal left as it was
 //!
 //! # Examples
 //!
@@ -24,6 +22,5 @@
 pub mod cli;
 pub mod screen;
 pub mod state;
-pub mod terminal;
 pub mod watcher;
 pub mod words;

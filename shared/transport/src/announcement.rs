@@ -1,6 +1,5 @@
-//! Announcement of one side of the channel: a daemon or a controller.
-//!
-//! Identity of a file, a directory or the shared memory, independent of its name.
+//! Announcement of one side of the channel, a daemon or a controller, and the identity of a file, a directory or the
+//! shared memory, independent of its name.
 
 use std::fmt;
 use std::fs::Metadata;

@@ -1,6 +1,5 @@
-//! Turning correlated rows into independent ones of unit variance.
-//!
-//! Least squares in square-root information form.
+//! Correlated rows turned into independent ones of unit variance, and least squares over these in square-root
+//! information form.
 
 use nalgebra::{SMatrix, SVector};
 

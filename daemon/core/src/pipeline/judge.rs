@@ -4,8 +4,6 @@
 //! - [`LackOfFit`]: whether a force that no parameter explains lasts
 //! - [`StatusInputs`]: everything known of an estimate, and the verdict on it
 //! - [`InputState`], [`Judgement`]: the state of an estimator's input, and the estimator's answer
-//!
-//! Consistency of an estimator's innovations with its covariance.
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_shared::{Reason, Status};

@@ -13,7 +13,7 @@
 //! - The first state of a window, whose density I_1 needs and the papers do not give, is the
 //!   filter's prediction from the window before.
 //!
-//! The settings of sliding-window EM, the window as it slides, and its iterations.
+//! Here are the settings, the window as it slides, and its iterations; `expectation` has the E-step.
 
 mod expectation;
 #[cfg(test)]

@@ -1,6 +1,5 @@
-//! Declared model of a train.
-//!
-//! Rules for a number of a file: the values that it may have, and how a finding is combined with a declared value.
+//! Declared model of a train, and the rules for a number of its file: the values that it may have, and how a finding is
+//! combined with a declared value.
 
 mod derived;
 pub mod numbers;

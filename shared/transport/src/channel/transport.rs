@@ -1,6 +1,5 @@
-//! A thread's access to the transport.
-//!
-//! Sending and receiving ends: the transport's ports behind trait objects. They are instantiated here for each payload,
+//! A thread's access to the transport, and its sending and receiving ends: the transport's ports behind trait objects.
+//! They are instantiated here for each payload,
 //! so that the generic code is compiled in this crate.
 
 use std::fmt::Debug;

@@ -8,7 +8,6 @@
 //!
 //! # Layout, in the order a sample takes
 //!
-//! - `suspects`: the effects that are looked for, the time since which a brake may drag, and the pressure that shows it
 //! - `covariates`, `wheel_scale`: evidence that a sample gives on each suspect
 //! - `rows`: blocks to independent rows of unit variance
 //! - `information`: the uncertainty of every parameter, and the likelihood ratios
@@ -16,7 +15,7 @@
 //! - `naming`: the suspect, its alternatives, and the end of the suspicion
 //! - `estimator`: the pipeline around these parts
 //!
-//! The effects that the monitor looks for, and brake-cylinder pressure that stays while no brake is reported.
+//! # The effects that are looked for
 //!
 //! Figures that are never known exactly are among the base model's own parameters: the forces' scales and delay, the
 //! load, the wind of the day, the curve constant, the extra resistance of cold bearings. An unusual value of one of

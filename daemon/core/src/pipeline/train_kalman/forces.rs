@@ -1,6 +1,5 @@
-//! Forces as they act, some time after their report.
-//!
-//! How late and how strong brakes are, learned from braking to braking.
+//! Forces as they act, some time after their report, and how late and how strong brakes are, learned from braking to
+//! braking.
 //!
 //! A lagging brake lags at every stop. If its lateness were taken to have mean zero, each of a hundred departures would
 //! push the resistance at low speed the same way, by less than its standard deviation, and all of them together by far

@@ -1,6 +1,5 @@
-//! The state before the first sample, and everything that samples teach but an unexplained braking must not.
-//!
-//! Estimate of the load, and the times at which the load may have changed.
+//! The state before the first sample, everything that samples teach but an unexplained braking must not, and the times
+//! at which the load may have changed.
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{Davis, TrainModel};

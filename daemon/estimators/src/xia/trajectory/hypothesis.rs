@@ -219,7 +219,7 @@ pub fn united(one: (&JumpHypothesis, f64), other: (&JumpHypothesis, f64)) -> (Ju
 #[cfg(test)]
 mod tests {
     use super::super::fit::{DavisPrior, FitSettings, MotionSegment, TrajectoryFitter};
-    use super::super::test_runs::{FAST, normal, random, speeds, steps};
+    use super::super::tests::{FAST, normal, random, speeds, steps};
     use super::*;
     use dynocar_core::filter::levenberg_marquardt::ParameterBox;
     use dynocar_model::force::mps2_per_n_per_kn;

@@ -12,10 +12,10 @@
 //! of first order in Δs. The time rule is of second order, so that samples of 1 s do as well as
 //! samples of 0.2 s.
 //!
-//! Response of a filter's estimate to a disturbance of unit density.
+//! # Response of a filter's estimate to a disturbance of unit density
 //!
-//! With the gains that a filter has used, the covariance of its estimate is linear in the densities of the noise. This
-//! module follows the disturbance's part for a density of 1 (m/s)²/s; at the best gains it is also the derivative of
+//! With the gains that a filter has used, the covariance of its estimate is linear in the densities of the noise. [`UnitDisturbance`]
+//! follows the disturbance's part for a density of 1 (m/s)²/s; at the best gains it is also the derivative of
 //! the covariance with respect to the density, since the derivative with respect to the gains vanishes.
 
 use dynocar_model::train::Davis;
@@ -287,7 +287,7 @@ mod unit_disturbance_tests {
     use super::{StepRule, *};
     use crate::xia::trajectory::hypothesis::{JumpHypothesis, OutlierModel};
     use crate::xia::trajectory::noise::{LearnedNoise, NoiseModel};
-    use crate::xia::trajectory::test_runs::{FAST, speeds, steps};
+    use crate::xia::trajectory::tests::{FAST, speeds, steps};
 
     /// Returns the covariance after a run, with its part by the disturbance.
     fn covariance(density: f64) -> (Matrix3<f64>, Matrix3<f64>) {
