@@ -182,47 +182,10 @@ pub(crate) fn stopping_estimate(
     effort: Vec<(f64, f64)>,
     confidence: f64,
 ) -> PyResult<(f64, f64, f64, f64)> {
-    let [
-        from_speed_mps,
-        to_speed_mps,
-        mass_kg,
-        rotating_mass_factor,
-        gradient_permille,
-        davis_a,
-        davis_b,
-        davis_c,
-        w0_std_n_per_kn,
-        brake_scale,
-        brake_scale_std,
-        traction_cut_off_s,
-        dead_time_s,
-        build_up_s,
-        jerk_limit_mps3,
-        response_std_s,
-        adhesion,
-        adhesion_std,
-    ] = numbers;
-    let request = StopRequest {
-        from_speed_mps,
-        to_speed_mps,
-        mass_kg,
-        rotating_mass_factor,
-        gradient_permille,
-        davis_a,
-        davis_b,
-        davis_c,
-        w0_std_n_per_kn,
-        brake_scale,
-        brake_scale_std,
-        traction_cut_off_s,
-        dead_time_s,
-        build_up_s,
-        jerk_limit_mps3,
-        response_std_s,
-        adhesion,
-        adhesion_std,
-        rail,
-    };
+    let mut request = StopRequest { rail, ..StopRequest::default() };
+    for (member, number) in request.fields_mut().into_iter().zip(numbers) {
+        member.set_word(0, number.to_bits());
+    }
     let effort: Vec<EffortPoint> =
         effort.into_iter().map(|(speed_mps, force_n)| EffortPoint { speed_mps, force_n }).collect();
     let found = request.estimate(&effort, confidence).map_err(|code| of_code(py, code))?;

@@ -59,7 +59,7 @@ fn every_unit_converts_to_its_base() {
 
 #[test]
 fn conversion_there_and_back_is_the_identity() {
-    for unit in UNITS {
+    for &unit in UNITS {
         for value in [-40.0, 0.0, 0.1, 7.3, 1e4] {
             let back = unit.from_base(unit.to_base(value));
             assert!((back - value).abs() <= 1e-12 * (1.0 + value.abs()), "{}", unit.name);
@@ -112,7 +112,7 @@ fn rare_units_convert_to_their_base() {
 
 #[test]
 fn every_spelling_leads_to_its_unit() {
-    for unit in UNITS {
+    for &unit in UNITS {
         assert_eq!(Unit::spelled(unit.dimension, unit.name), Some(unit));
         for text in unit.spellings.split(' ').filter(|text| !text.is_empty()) {
             assert_eq!(fold(text), text, "spellings are folded");
