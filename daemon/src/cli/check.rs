@@ -204,7 +204,7 @@ pub fn report(config: &DaemonConfig) -> String {
             pipeline.estimator.kind().to_string(),
             thread.name.clone(),
             thread.core.map_or("any".into(), |core| core.to_string()),
-            thread.idle.to_string(),
+            thread.idle.name().into(),
             thread.priority.map_or("ordinary".into(), |priority| format!("fifo {priority}")),
             trains.join(" "),
         ]);
@@ -250,7 +250,7 @@ struct PipelineAnswer<'a> {
     kind: &'static str,
     thread: &'a str,
     core: Option<usize>,
-    idle: String,
+    idle: &'static str,
     priority: Option<u8>,
     trains: Vec<u64>,
 }
@@ -278,7 +278,7 @@ pub fn answer(config: &DaemonConfig) -> DaemonAnswer<'_> {
                     kind: pipeline.estimator.kind().name(),
                     thread: &thread.name,
                     core: thread.core,
-                    idle: thread.idle.to_string(),
+                    idle: thread.idle.name(),
                     priority: thread.priority,
                     trains: pipeline.trains.iter().map(|train| train.0).collect(),
                 }

@@ -40,6 +40,11 @@ impl Failure {
         Failure::Input(error.to_string())
     }
 
+    /// Returns a failure of an input file, in the words of an error.
+    fn at(path: &Path, message: String) -> Self {
+        Failure::At(SourcePosition::whole(&path.display().to_string()), message)
+    }
+
     /// Returns the failure for machines; `None` when the result is reported already.
     pub fn answer(&self) -> Option<ErrorAnswer> {
         let (message, position, exit_status) = match self {
@@ -108,9 +113,7 @@ impl From<LoadError> for Failure {
             | LoadError::NoSuchPath { path }
             | LoadError::NotADataset { path, .. }
             | LoadError::NoManifest { path, .. }
-            | LoadError::NoRecording { path } => {
-                Failure::At(SourcePosition::whole(&path.display().to_string()), message)
-            }
+            | LoadError::NoRecording { path } => Failure::at(&path, message),
         }
     }
 }
@@ -122,9 +125,7 @@ impl From<ConfigError> for Failure {
             ConfigError::Model(error) => error.into(),
             ConfigError::Unreadable { path, .. }
             | ConfigError::Malformed { path, .. }
-            | ConfigError::OutOfRange { path, .. } => {
-                Failure::At(SourcePosition::whole(&path.display().to_string()), message)
-            }
+            | ConfigError::OutOfRange { path, .. } => Failure::at(&path, message),
         }
     }
 }

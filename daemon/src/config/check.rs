@@ -15,7 +15,7 @@ use super::quantities::Answers;
 use super::{
     Checker, ConfigError, IdleStrategy, ModelsConfig, PipelineConfig, ProcessConfig, RawConfig,
     RawMetrics, RawModels, RawPipeline, RawQuantities, RawThread, RawTrain, StateConfig,
-    ThreadConfig, apart,
+    ThreadConfig, USUAL_INTERVAL_S, apart,
 };
 use crate::dataset::{LoadError, read_text};
 use crate::models::{ModelHash, ModelText};
@@ -83,6 +83,13 @@ impl DaemonConfig {
         check(path, text)
     }
 }
+
+/// Share of the error that a model must gain to count as better, unless set otherwise.
+const USUAL_LEAST_GAIN: f64 = 0.1;
+/// Trips between two mistakes unless set otherwise: twenty years of twenty-seven trips a day.
+const USUAL_TRIPS_BETWEEN_MISTAKES: f64 = 200_000.0;
+/// The most candidates of a train that are on trial at once, unless set otherwise.
+const USUAL_CANDIDATES_MAX: u64 = 2;
 
 /// The most pipeline threads that one sample channel serves.
 const THREADS_MAX: usize = 10;
@@ -325,37 +332,32 @@ fn check_models(checker: &Checker, raw: RawModels) -> Result<ModelsConfig, Confi
         let given = raw.directory.display();
         return checker.refuse("models.directory", given, "an existing directory");
     }
-    let is_within = |value: f64, low: f64, high: f64| (low..=high).contains(&value);
-    if !is_within(raw.least_gain, 0.0, 0.9) {
+    let least_gain = raw.least_gain.unwrap_or(USUAL_LEAST_GAIN);
+    if !(0.0..=0.9).contains(&least_gain) {
         let allowed = "a share of the error, 0 to 0.9";
-        return checker.refuse("models.least_gain", raw.least_gain, allowed);
+        return checker.refuse("models.least_gain", least_gain, allowed);
     }
-    if !is_within(raw.trips_between_mistakes, 20.0, 1e12) {
-        let (key, given) = ("models.trips_between_mistakes", raw.trips_between_mistakes);
-        return checker.refuse(key, given, "20 to 1e12 trips");
+    let trips_between_mistakes = raw.trips_between_mistakes.unwrap_or(USUAL_TRIPS_BETWEEN_MISTAKES);
+    if !(20.0..=1e12).contains(&trips_between_mistakes) {
+        let key = "models.trips_between_mistakes";
+        return checker.refuse(key, trips_between_mistakes, "20 to 1e12 trips");
     }
     for (key, [low, high]) in &raw.bounds {
         if !(low.is_finite() && high.is_finite() && low <= high) {
-            let key = format!("models.bounds.{key:?}");
-            return checker.refuse(
-                key,
-                format!("[{low}, {high}]"),
-                "the least value, then the greatest",
-            );
+            let (key, given) = (format!("models.bounds.{key:?}"), format!("[{low}, {high}]"));
+            return checker.refuse(key, given, "the least value, then the greatest");
         }
     }
     check_core(checker, "models.core", raw.core)?;
+    let candidates_max = raw.candidates_max.unwrap_or(USUAL_CANDIDATES_MAX);
+    let interval_s = raw.interval_s.unwrap_or(USUAL_INTERVAL_S);
+    let RawModels { adopt, core, bounds, .. } = raw;
     Ok(ModelsConfig {
         directory,
-        rule: Rule {
-            adopt: raw.adopt,
-            least_gain: raw.least_gain,
-            trips_between_mistakes: raw.trips_between_mistakes,
-            bounds: raw.bounds,
-        },
-        candidates_max: checker.range("models.candidates_max", raw.candidates_max, 0, 8)? as usize,
-        core: raw.core,
-        interval_s: checker.range("models.interval_s", raw.interval_s, 1, 3_600)?,
+        rule: Rule { adopt, least_gain, trips_between_mistakes, bounds },
+        candidates_max: checker.range("models.candidates_max", candidates_max, 0, 8)? as usize,
+        core,
+        interval_s: checker.range("models.interval_s", interval_s, 1, 3_600)?,
     })
 }
 

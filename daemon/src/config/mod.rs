@@ -25,6 +25,7 @@ use std::sync::Arc;
 use dynocar_core::pipeline::{Pipeline, SettingError};
 use dynocar_dataset::FileProblem;
 use dynocar_estimators::EstimatorSettings;
+use dynocar_model::named;
 use dynocar_shared::TrainId;
 use serde::Deserialize;
 
@@ -99,25 +100,23 @@ impl Checker<'_> {
     }
 }
 
-/// Behaviour of a pipeline thread while no sample comes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum IdleStrategy {
-    /// Polls for samples without pause: lowest latency, one whole core.
-    Busy,
-    /// Polls for a while, then sleeps until the controller wakes it.
-    Adaptive,
-    /// Sleeps at once: least processor time.
-    Event,
+named! {
+    /// Behaviour of a pipeline thread while no sample comes.
+    #[derive(Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    IdleStrategy ("in the configuration") {
+        /// Polls for samples without pause: lowest latency, one whole core.
+        Busy "busy";
+        /// Polls for a while, then sleeps until the controller wakes it.
+        Adaptive "adaptive";
+        /// Sleeps at once: least processor time.
+        Event "event";
+    }
 }
 
 impl std::fmt::Display for IdleStrategy {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            IdleStrategy::Busy => "busy",
-            IdleStrategy::Adaptive => "adaptive",
-            IdleStrategy::Event => "event",
-        })
+        f.write_str(self.name())
     }
 }
 
@@ -181,19 +180,12 @@ pub struct StateConfig {
 
 impl Default for StateConfig {
     fn default() -> Self {
-        StateConfig {
-            keep: true,
-            directory: None,
-            interval_s: default_interval_s(),
-            age_max_h: 7 * 24,
-        }
+        StateConfig { keep: true, directory: None, interval_s: USUAL_INTERVAL_S, age_max_h: 7 * 24 }
     }
 }
 
-/// Returns the interval in s at which the states that outlive the daemon are written.
-pub(super) const fn default_interval_s() -> u64 {
-    30
-}
+/// Time in s between two writings of the states that outlive the daemon, and of the trials, unless set otherwise.
+const USUAL_INTERVAL_S: u64 = 30;
 
 /// The store of models, and the treatment of models on trial.
 #[derive(Clone, Debug, PartialEq)]
@@ -276,36 +268,15 @@ type RawQuantities = BTreeMap<String, String>;
 #[serde(deny_unknown_fields)]
 struct RawModels {
     directory: PathBuf,
-    #[serde(default = "default_adopt")]
+    #[serde(default)]
     adopt: Adopt,
-    #[serde(default = "default_least_gain")]
-    least_gain: f64,
-    #[serde(default = "default_trips_between_mistakes")]
-    trips_between_mistakes: f64,
-    #[serde(default = "default_candidates_max")]
-    candidates_max: u64,
-    #[serde(default = "default_interval_s")]
-    interval_s: u64,
+    least_gain: Option<f64>,
+    trips_between_mistakes: Option<f64>,
+    candidates_max: Option<u64>,
+    interval_s: Option<u64>,
     core: Option<usize>,
     #[serde(default)]
     bounds: BTreeMap<String, [f64; 2]>,
-}
-
-const fn default_adopt() -> Adopt {
-    Adopt::Ask
-}
-
-const fn default_least_gain() -> f64 {
-    0.1
-}
-
-/// Twenty years of twenty-seven trips a day.
-const fn default_trips_between_mistakes() -> f64 {
-    200_000.0
-}
-
-const fn default_candidates_max() -> u64 {
-    2
 }
 
 #[derive(Debug, Deserialize)]

@@ -10,10 +10,11 @@ use crate::models::records::ModelChoice;
 use crate::models::{Action, ModelHash, ModelText, ModelsError, TrainModels};
 
 /// Who adopts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Adopt {
     /// A person, by `dynocar models adopt`; the log says when a rival is better.
+    #[default]
     Ask,
     /// The rule, as soon as there is evidence enough.
     WhenBetter,

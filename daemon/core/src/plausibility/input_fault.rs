@@ -209,11 +209,9 @@ impl DetectedFault {
 impl fmt::Display for DetectedFault {
     /// In words, for a quantity read in the unit that samples hold.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let base = match self.fault.dimension() {
-            Dimension::Ratio => Unit::find(Dimension::Ratio, "permille"),
-            dimension => Some(Unit::base_of(dimension)),
-        };
-        f.write_str(&self.words(&base.unwrap_or_else(|| Unit::base_of(self.fault.dimension()))))
+        let dimension = self.fault.dimension();
+        let permille = Unit::find(dimension, "permille");
+        f.write_str(&self.words(&permille.unwrap_or_else(|| Unit::base_of(dimension))))
     }
 }
 

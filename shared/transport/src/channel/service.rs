@@ -209,13 +209,13 @@ pub trait Payload: sealed::Sealed + Copy + Debug + 'static {
     /// The type's name on the channel.
     const WIRE_NAME: &'static str;
     /// Messages a receiver holds before the oldest is overwritten.
-    const BUFFER: usize;
+    const BUFFER: usize = 1;
     /// Messages a sender keeps for receivers that come later.
-    const HISTORY: usize;
+    const HISTORY: usize = 1;
     /// The most senders of one train's channel.
     const SENDERS_MAX: usize;
-    /// The most receivers of one train's channel.
-    const RECEIVERS_MAX: usize;
+    /// The most receivers of one train's channel: pipeline threads, recorder, live view.
+    const RECEIVERS_MAX: usize = 12;
 }
 
 impl Payload for TrainSample {
@@ -225,27 +225,19 @@ impl Payload for TrainSample {
     const HISTORY: usize = 0;
     /// The controller, and a dead one that is not cleared away yet.
     const SENDERS_MAX: usize = 4;
-    /// Pipeline threads, recorder, live view.
-    const RECEIVERS_MAX: usize = 12;
 }
 
 impl Payload for ParameterSnapshot {
     const CHANNEL: Channel = Channel::Snapshots;
     const WIRE_NAME: &'static str = ParameterSnapshot::WIRE_NAME;
-    const BUFFER: usize = 1;
-    const HISTORY: usize = 1;
     /// Each pipeline has a sender of its own; twice, for a dead daemon not cleared away yet.
     const SENDERS_MAX: usize = 2 * PIPELINES_MAX;
-    const RECEIVERS_MAX: usize = 12;
 }
 
 impl Payload for SleeperState {
     const CHANNEL: Channel = Channel::Sleepers;
     const WIRE_NAME: &'static str = SleeperState::WIRE_NAME;
-    const BUFFER: usize = 1;
-    const HISTORY: usize = 1;
     const SENDERS_MAX: usize = PIPELINES_MAX;
-    const RECEIVERS_MAX: usize = 12;
 }
 
 // SAFETY: a payload is a `repr(C)` struct of plain numbers without padding (checked when it is
