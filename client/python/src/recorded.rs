@@ -1,6 +1,6 @@
-//! `check`, `read`, `identify` and `explain` over recorded runs: the answers of the commands as JSON and in words, the report
-//! of an explanation with its plots, the predictions of the updated model, and its files. Columns for NumPy and tables for
-//! Arrow share their memory: nothing is copied.
+//! `check`, `read`, `identify` and `explain` over recorded runs: the answers of the commands as JSON and in words, the
+//! report of an explanation with its plots, the predictions of the updated model, and its files. Columns for NumPy and
+//! tables for Arrow share their memory: nothing is copied.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

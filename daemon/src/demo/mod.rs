@@ -2,6 +2,7 @@
 //!
 //! A controller process replays an embedded recorded run into shared memory, a daemon process
 //! estimates, and this process is the client that polls each control cycle.
+//!
 //! The live view has one line for each pipeline and a progress bar of the samples; plain lines without a terminal.
 
 mod stage;

@@ -164,7 +164,7 @@ fn shown(key: &str, value: &Value) -> String {
 }
 
 #[cfg(test)]
-mod difference_tests {
+mod tests {
     use super::*;
 
     #[test]

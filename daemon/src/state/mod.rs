@@ -197,7 +197,7 @@ fn usual(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
 }
 
 #[cfg(test)]
-mod directories_tests {
+mod tests {
     use std::os::unix::fs::PermissionsExt;
 
     use super::*;

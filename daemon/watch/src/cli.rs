@@ -1,5 +1,5 @@
-//! The command line of `dynocar watch`: the screen on a terminal, with its keys, a terminal that is restored at the end,
-//! and a terminal that is gone or takes no more output; else lines, one a second for each train.
+//! The command line of `dynocar watch`: the screen on a terminal, with its keys, a terminal that is restored at the
+//! end, and a terminal that is gone or takes no more output; else lines, one a second for each train.
 
 use std::io;
 use std::io::{ErrorKind, IsTerminal, Write};
@@ -276,7 +276,7 @@ fn pressed(choice: ScreenChoice, key: KeyCode, trains: usize) -> ScreenChoice {
 }
 
 #[cfg(test)]
-mod terminal_tests {
+mod tests {
     use super::*;
 
     #[test]

@@ -1,4 +1,5 @@
-//! Covariances after a scalar measurement and after a step of time: in full, and as a lower triangular factor L, P = L Lᵀ.
+//! Covariances after a scalar measurement and after a step of time, in full or as a lower triangular factor L with
+//! P = L Lᵀ.
 //!
 //! The factor keeps P symmetric and positive even if its entries differ by many orders of magnitude (Bierman 1977,
 //! Factorization Methods for Discrete Sequential Estimation; Carlson 1973 for the update).

@@ -2,11 +2,12 @@
 //!
 //! # Coasting segments
 //!
-//! Regression data from coasting are least-squares slopes of half-overlapping segments (figure 2): a segment is so long that the speed changes by 0.5 km/h, and the next starts in its middle. This
-//! module departs from the paper in three ways. A segment's length is set when it starts, from the resistance known so
-//! far: if it ended where a noisy speed first crosses its bound, it would be too short on average and w0 would come out
-//! 1.7 % low. The regressors are the slopes of the integrals of 1, v, v² over the same samples, so that they weight the
-//! speeds as the slope does. Spikes are refused before they reach a segment.
+//! Regression data from coasting are least-squares slopes of half-overlapping segments (figure 2): a segment is so long
+//! that the speed changes by 0.5 km/h, and the next starts in its middle. This module departs from the paper in three
+//! ways. A segment's length is set when it starts, from the resistance known so far: if it ended where a noisy speed
+//! first crosses its bound, it would be too short on average and w0 would come out 1.7 % low. The regressors are the
+//! slopes of the integrals of 1, v, v² over the same samples, so that they weight the speeds as the slope does. Spikes
+//! are refused before they reach a segment.
 
 use dynocar_core::filter::{FittedLine, Gaussian, Mils, NotPositiveDefinite, Penalty, Rls};
 use dynocar_core::pipeline::momentum::{
@@ -315,7 +316,7 @@ impl Solver {
 }
 
 #[cfg(test)]
-mod coasting_tests {
+mod tests {
     use super::*;
     use crate::resistance::test_runs::{driven, normal};
     use dynocar_core::pipeline::momentum::scaled;

@@ -1,5 +1,5 @@
-//! The sliding window of Xia 2023: points at even distances, steps between them, and the mean squared deviation with its
-//! analytic gradient and Hessian.
+//! The sliding window of Xia 2023: points at even distances, steps between them, and the mean squared deviation with
+//! its analytic gradient and Hessian.
 //!
 //! Equations 7-8 and 11-23, corrected (finite differences below verify each correction):
 //!

@@ -143,7 +143,7 @@ fn range(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
 }
 
 #[cfg(test)]
-mod plots_tests {
+mod tests {
     use super::*;
 
     #[test]

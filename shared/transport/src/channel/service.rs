@@ -2,6 +2,7 @@
 //!
 //! This way the transport's generic code, some thousand functions, is compiled once, in this crate, and not in every
 //! crate that opens or drops a port.
+//!
 //! Here are also the types that cross the shared memory, in the form that the transport requires.
 
 use std::fmt::Debug;

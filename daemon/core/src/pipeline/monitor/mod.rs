@@ -276,7 +276,7 @@ impl ReleasedPressure {
 }
 
 #[cfg(test)]
-mod suspects_tests {
+mod tests {
     use super::*;
 
     #[test]

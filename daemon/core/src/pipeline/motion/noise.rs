@@ -1,5 +1,5 @@
-//! The noise of a measured speed, learned from the speeds themselves, and the steps that it is reported in; the noise of
-//! a measured position, learned from the positions themselves.
+//! The noise of a measured speed, learned from the speeds themselves, and the steps that it is reported in; the noise
+//! of a measured position, learned from the positions themselves.
 
 use dynocar_model::force::ResolvedSample;
 

@@ -14,9 +14,9 @@
 //!
 //! # Response of a filter's estimate to a disturbance of unit density
 //!
-//! With the gains that a filter has used, the covariance of its estimate is linear in the densities of the noise. [`UnitDisturbance`]
-//! follows the disturbance's part for a density of 1 (m/s)²/s; at the best gains it is also the derivative of
-//! the covariance with respect to the density, since the derivative with respect to the gains vanishes.
+//! With the gains that a filter has used, the covariance of its estimate is linear in the densities of the noise.
+//! [`UnitDisturbance`] follows the disturbance's part for a density of 1 (m/s)²/s; at the best gains it is also the
+//! derivative of the covariance with respect to the density, since the derivative with respect to the gains vanishes.
 
 use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
