@@ -3,18 +3,16 @@
 //! # Layout
 //!
 //! - [`cli`]: the commands of `dynocar`, one file each
-//! - [`config`]: the daemon's configuration
+//! - [`config`]: the daemon's configuration, and its pipelines
 //! - [`dataset`]: recorded runs from disk
 //! - [`ending`]: when a long-running program ends
-//! - [`log`]: the daemon's log, which nobody has to wait for
+//! - [`log`]: the daemon's log, which nobody has to wait for, and the changes that it reports
 //! - [`models`]: a store of models
 //! - [`observing`]: observation of trains, in one vocabulary
 //! - [`operator`]: texts for an operator, in one place
-//! - [`output`]: where results go
-//! - [`pipelines`]: the pipelines of a configuration
+//! - [`output`]: where results go; lines on a terminal that later lines replace
 //! - [`programs`]: commands that are programs of their own, and their failures
 //! - [`demo`]: the main job as a demonstration
-//! - [`redrawn`]: lines on a terminal that later lines replace
 //! - [`run`]: the daemon, every stage on one screen
 //! - [`runtime`]: its threads
 //! - [`shadow`]: models on trial, and the change from one to another
@@ -42,9 +40,7 @@ pub mod models;
 pub mod observing;
 pub mod operator;
 pub mod output;
-pub mod pipelines;
 pub mod programs;
-pub mod redrawn;
 pub mod replay;
 pub mod run;
 pub mod runtime;

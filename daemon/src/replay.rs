@@ -7,6 +7,8 @@ use dynocar_shared::services::SAMPLE_BUFFER;
 use dynocar_shared::{ParameterSnapshot, RejectionReason, TrainId, TrainSample};
 use dynocar_transport::{ChannelError, Host, Peer, monotonic_now_ns};
 
+use crate::operator::refusals;
+
 /// How fast recorded time passes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rate {
@@ -67,17 +69,13 @@ impl ReplayReport {
         // A daemon that came meanwhile has counted nothing else.
         let before = self.before.iter().find(is_same).copied();
         let before = before.unwrap_or(ParameterSnapshot::empty());
-        let mut reasons: Vec<(RejectionReason, u32)> = RejectionReason::ALL
-            .iter()
-            .map(|&it| (it, after.rejected(it).saturating_sub(before.rejected(it))))
-            .filter(|&(_, count)| count > 0)
-            .collect();
-        reasons.sort_by_key(|&(_, count)| std::cmp::Reverse(count));
+        let [now, then] = [after, &before].map(|it| &it.rejected_by_reason);
+        let new = std::array::from_fn(|index| now[index].saturating_sub(then[index]));
         ReplayCounts {
             used: after.samples_used.saturating_sub(before.samples_used),
             rejected: after.samples_rejected.saturating_sub(before.samples_rejected),
             lost: after.samples_lost.saturating_sub(before.samples_lost),
-            reasons,
+            reasons: refusals(&new),
         }
     }
 

@@ -21,15 +21,15 @@ use tracing::{info, warn};
 use super::runtime::system::{
     STACK_BYTES, lock_all_memory, pin_to_core, prefault_stack, raise_open_files, set_fifo_priority,
 };
-use crate::config::{DaemonConfig, IdleStrategy, ModelsConfig, ThreadConfig};
+use crate::config::{
+    DaemonConfig, IdleStrategy, ModelsConfig, SettingRefused, ThreadConfig, build_pipeline,
+};
 use crate::ending::{self, EndingError};
 use crate::models::Store;
 use crate::observing::ObservedTrain;
-use crate::pipelines::{SettingRefused, build_pipeline};
 use crate::runtime::exchange::Exchange;
 use crate::runtime::main_thread::{RuntimeWatch, WatchedPipeline};
-use crate::runtime::tally::Tally;
-use crate::runtime::worker::{ChannelPlan, Worker, WorkerPlan};
+use crate::runtime::worker::{ChannelPlan, PipelineReport, Worker, WorkerPlan};
 use crate::shadow::train::PlacedPipeline;
 use crate::shadow::{self, Board, ShadowTrain};
 use crate::stamp::Stamp;
@@ -96,7 +96,7 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
     let workers = start_workers(plans)?;
     let shadow = shadow
         .map(|(trains, models)| {
-            shadow::thread::start(trains, models, host.clone(), board.clone(), Arc::clone(&stop))
+            shadow::start(trains, models, host.clone(), board.clone(), Arc::clone(&stop))
         })
         .transpose()
         .map_err(|source| RunError::System { what: "thread of models on trial", source })?;
@@ -109,7 +109,7 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
     let listener = listener.transpose()?;
 
     let supervisor = Supervisor::from_environment();
-    let alive = watched.iter().map(|it| (it.name.clone(), Arc::clone(&it.tally))).collect();
+    let alive = watched.iter().map(|it| (it.name.clone(), Arc::clone(&it.report.tally))).collect();
     let watchdog = Watchdog::new(&supervisor, alive);
     supervisor.notify("READY=1");
     let trains = trains.into_iter().zip(counts).collect();
@@ -192,16 +192,16 @@ fn plan_workers(
             if let Some(kept) = kept {
                 pipeline.warm_start(&kept);
             }
-            let tally = Arc::new(Tally::default());
+            let report = PipelineReport::default();
             let name = settings.name.clone();
-            let (index, counted) = (index as u32, Arc::clone(&tally));
-            watched.push(WatchedPipeline { name, train: train.id, index, tally: counted });
+            let (index, watched_report) = (index as u32, report.clone());
+            watched.push(WatchedPipeline { name, train: train.id, index, report: watched_report });
             let channels = &mut plans[settings.thread].channels;
             match channels.iter_mut().find(|channel| channel.train == train.id) {
-                Some(channel) => channel.pipelines.push((pipeline, tally)),
+                Some(channel) => channel.pipelines.push((pipeline, report)),
                 None => {
                     let (count, pipelines) =
-                        (Arc::clone(&counts[train_index]), vec![(pipeline, tally)]);
+                        (Arc::clone(&counts[train_index]), vec![(pipeline, report)]);
                     let (train, index, exchange) = (train.id, 0, None);
                     channels.push(ChannelPlan { train, count, index, pipelines, exchange });
                 }

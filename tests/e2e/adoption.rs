@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 use dynocar::dataset;
-use dynocar::models::decision::ModelChoice;
+use dynocar::models::records::ModelChoice;
 use dynocar::models::{
     ModelHash, ModelText, NewDecision, NewModel, Origin, Store, TrainModels, UtcSecond,
 };

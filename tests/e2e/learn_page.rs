@@ -3,15 +3,15 @@
 use std::path::PathBuf;
 use std::process::Command;
 
-use dynocar::models::decision::ModelChoice;
 use dynocar::models::origin::{EventWindow, HeldOutError};
+use dynocar::models::records::ModelChoice;
 use dynocar::models::{
     FoundEffect, MaintenanceEvent, ModelFigure, ModelHash, ModelText, NewDecision, NewModel,
     Origin, Store, TrainModels, UtcSecond,
 };
 use dynocar::shadow::record::{TrialRecord, TriedModel};
+use dynocar_core::trial::Ledger;
 use dynocar_core::trial::evidence::RivalEvidence;
-use dynocar_core::trial::ledger::Ledger;
 use dynocar_model::simulate::SpeedError;
 use dynocar_shared::TrainId;
 use dynocar_tests::browser::Browser;

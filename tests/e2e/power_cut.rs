@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use dynocar::models::{ModelText, NewModel, Origin, UtcSecond, numbered, store};
+use dynocar::models::{ModelText, NewModel, Origin, UtcSecond, records, store};
 use dynocar::state::file;
 use dynocar::storage::{Disk, Rights, replace};
 use dynocar_tests::power_cut::{LossyDisk, Neglect};
@@ -120,9 +120,9 @@ fn cut_store(neglect: Neglect) -> (usize, Option<String>) {
     let disk = LossyDisk::new(neglect);
     store::write_model(&disk, folder, &model).expect("this disk takes everything");
     let put = disk.steps();
-    assert!(numbered::write(&disk, decisions, 1, &model.origin).expect("a disk that takes it"));
+    assert!(records::write(&disk, decisions, 1, &model.origin).expect("a disk that takes it"));
     let decided = disk.steps();
-    assert!(!numbered::write(&disk, decisions, 1, &model.origin).expect("a disk that takes it"));
+    assert!(!records::write(&disk, decisions, 1, &model.origin).expect("a disk that takes it"));
     let whole = |content: &[u8]| toml::from_slice::<Origin>(content).ok();
     let mut looked_at = 0;
     for count in 0..=disk.steps() {
@@ -135,7 +135,7 @@ fn cut_store(neglect: Neglect) -> (usize, Option<String>) {
                 && at(folder.join("answer.json")) == Some(b"{}")
                 && origin.and_then(whole).as_ref() == Some(&model.origin);
             let is_none = !left.keys().any(|name| name.starts_with(folder));
-            let decision = at(numbered::path_of(decisions, 1));
+            let decision = at(records::path_of(decisions, 1));
             let is_decision = decision.and_then(whole).as_ref() == Some(&model.origin);
             let is_promised = (is_model || is_none && count < put)
                 && (is_decision || decision.is_none() && count < decided);

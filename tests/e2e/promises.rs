@@ -108,7 +108,7 @@ fn the_reading_guide_has_a_line_for_every_member_of_the_vocabularies() {
 /// The page, the order in the code and the shipped configuration recommend the same.
 #[test]
 fn what_the_reading_guide_recommends_is_the_default_and_what_is_shipped() {
-    use dynocar_core::pipeline::quantities::candidates;
+    use dynocar_core::pipeline::output::candidates;
     use dynocar_shared::Quantity;
     let guide = read("docs/guides/reading.md");
     let config = read("config/daemon.toml");

@@ -3,22 +3,17 @@
 //!
 //! # Layout
 //!
-//! - [`ends`]: ends of channels, each kept in the thread that opened it
-//! - [`channel`]: publisher and reader, [`snapshot`]: results of a reader
-//! - [`stopping`]: braking distance and time with a bound
+//! - [`channel`]: publisher and reader, each kept in the thread that opened it
+//! - [`snapshot`]: results of a reader; braking distance and time with a bound
 //! - [`about`]: clock, versions, who serves a train, vocabularies
 //! - [`calls`]: failures as the exceptions of `dynocar/_errors.py`; long work that Ctrl-C ends
-//! - [`recorded`]: `check`, `read`, `identify`, `explain`
-//! - [`table`]: columns for NumPy, tables for Arrow
+//! - [`recorded`]: `check`, `read`, `identify`, `explain`; columns for NumPy, tables for Arrow
 
 mod about;
 mod calls;
 mod channel;
-mod ends;
 mod recorded;
 mod snapshot;
-mod stopping;
-mod table;
 
 use pyo3::prelude::*;
 
@@ -32,13 +27,13 @@ mod _native {
     #[pymodule_export]
     use crate::channel::{Publisher, Reader};
     #[pymodule_export]
+    use crate::recorded::{Column, Table};
+    #[pymodule_export]
     use crate::recorded::{Explained, explain};
     #[pymodule_export]
     use crate::recorded::{check, identify, read};
     #[pymodule_export]
+    use crate::snapshot::stopping_estimate;
+    #[pymodule_export]
     use crate::snapshot::{ParameterSnapshot, Reading, dtypes};
-    #[pymodule_export]
-    use crate::stopping::stopping_estimate;
-    #[pymodule_export]
-    use crate::table::{Column, Table};
 }

@@ -1,8 +1,10 @@
-//! Results of a reader.
+//! Results of a reader, and braking distance and time by the law of `dynocar_shared::stopping`, with the arguments of
+//! the C interface.
 
-use dynocar_client::ffi::{Code, ReadingCopy};
+use dynocar_client::ffi::{Code, ReadingCopy, StopRequest};
 use dynocar_shared::RailAdhesion;
 use dynocar_shared::schema::{Field, sample_fields, snapshot_fields};
+use dynocar_shared::stopping::EffortPoint;
 use pyo3::exceptions::PyAttributeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyList};
@@ -168,4 +170,24 @@ pub(crate) fn dtypes() -> (Dtype, Dtype) {
         dtype(sample_fields(), size_of::<TrainSample>()),
         dtype(snapshot_fields(), size_of::<ParameterSnapshot>()),
     )
+}
+
+/// Returns distance, time, and both with the confidence. `numbers` are the members of `dynocar_stop` in `dynocar.h`
+/// before `rail`.
+#[pyfunction]
+pub(crate) fn stopping_estimate(
+    py: Python<'_>,
+    numbers: [f64; 18],
+    rail: u64,
+    effort: Vec<(f64, f64)>,
+    confidence: f64,
+) -> PyResult<(f64, f64, f64, f64)> {
+    let mut request = StopRequest { rail, ..StopRequest::default() };
+    for (member, number) in request.fields_mut().into_iter().zip(numbers) {
+        member.set_word(0, number.to_bits());
+    }
+    let effort: Vec<EffortPoint> =
+        effort.into_iter().map(|(speed_mps, force_n)| EffortPoint { speed_mps, force_n }).collect();
+    let found = request.estimate(&effort, confidence).map_err(|code| of_code(py, code))?;
+    Ok((found.distance_m, found.time_s, found.distance_bound_m, found.time_bound_s))
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use dynocar_core::pipeline::braking::intake::DeclaredGear;
-use dynocar_core::pipeline::quantities::candidates;
+use dynocar_core::pipeline::output::candidates;
 use dynocar_core::pipeline::{Pipeline, SettingError};
 use dynocar_estimators::EstimatorSettings;
 use dynocar_model::track::Track;

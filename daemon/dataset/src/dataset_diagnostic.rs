@@ -1,8 +1,7 @@
 //! Diagnostics to know before results from a dataset are believed, each once.
 
-use dynocar_core::plausibility::diagnosis::gradient_fault;
 use dynocar_core::plausibility::window_balance::WindowBalance;
-use dynocar_core::plausibility::{DetectedFault, Severity};
+use dynocar_core::plausibility::{DetectedFault, Severity, gradient_fault};
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use dynocar_model::units::Unit;

@@ -3,9 +3,8 @@
 
 use dynocar_core::pipeline::admission::Admission;
 use dynocar_core::pipeline::{Echo, Outcome};
-use dynocar_core::plausibility::DetectedFaults;
-use dynocar_core::plausibility::diagnosis::gradient_fault;
 use dynocar_core::plausibility::window_balance::WindowBalance;
+use dynocar_core::plausibility::{DetectedFaults, gradient_fault};
 use dynocar_model::force::ForceResolver;
 use dynocar_model::terms::wheel::STILL_MPS;
 use dynocar_shared::{RejectionReason, SampleField, TrainSample};

@@ -9,7 +9,7 @@ use dynocar_core::pipeline::braking::settings::{
     BrakeFactor, EkfSettings, LawSettings, SmootherSettings,
 };
 use dynocar_core::pipeline::monitor::{MonitorSettings, ResidualMonitor};
-use dynocar_core::pipeline::quantities::candidates;
+use dynocar_core::pipeline::output::candidates;
 use dynocar_core::pipeline::train_kalman::{TrainKalman, TrainKalmanSettings};
 use dynocar_core::pipeline::{Echo, Estimator, SettingError};
 use dynocar_model::train::TrainModel;

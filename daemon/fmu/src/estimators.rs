@@ -1,7 +1,7 @@
 //! The model that learns: the recommended estimators, and all its variables.
 
 use dynocar_core::pipeline::Pipeline;
-use dynocar_core::pipeline::quantities::candidates;
+use dynocar_core::pipeline::output::candidates;
 use dynocar_shared::{
     Parameter, ParameterSnapshot, PipelineKind, Quantity, SampleField, TrainSample,
 };

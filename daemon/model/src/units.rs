@@ -65,201 +65,143 @@ const STANDARD_GRAVITY_MPS2: f64 = 9.80665;
 /// Watts in a mechanical horsepower: 550 foot pounds-force in a second (NIST SP 811, appendix B.8).
 const HORSEPOWER_W: f64 = 550.0 * 0.3048 * POUND_FORCE_N;
 
-/// The units, with their spellings in files; the first units of a dimension are usual.
-static UNITS: [Unit; 80] = {
-    use Dimension::*;
-    [
-        unit(
-            "s",
-            Time,
-            1.0,
-            1.0,
-            "sec secs second seconds sek sekunde sekunden seconde secondes segundo segundos secondi",
-        ),
-        unit(
-            "ms",
-            Time,
-            1.0,
-            1e3,
-            "msec msecs millis millisec millisecond milliseconds millisekunde millisekunden millisecondes",
-        ),
-        unit("us", Time, 1.0, 1e6, "usec usecs micros microsecond microseconds mikrosekunden"),
-        unit("ns", Time, 1.0, 1e9, "nsec nanos nanosecond nanoseconds"),
-        unit("min", Time, 60.0, 1.0, "mins minute minutes minuten"),
-        unit("h", Time, 3600.0, 1.0, "hr hrs hour hours std stunden heures"),
-        rare("d", Time, 86_400.0, 1.0, "days datenum serial"),
-        rare("100ns", Time, 1.0, 1e7, "tick ticks filetime"),
-        unit("m", Length, 1.0, 1.0, "meter meters metre metres mtr metri metros м"),
-        unit("km", Length, 1e3, 1.0, "kilometer kilometers kilometre kilometres chilometri км"),
-        unit("mm", Length, 1.0, 1e3, "millimeter millimeters millimetre millimetres"),
-        rare("cm", Length, 1.0, 1e2, "centimeter centimeters centimetre centimetres"),
-        rare("ft", Length, 0.3048, 1.0, "feet foot"),
-        rare("yd", Length, 0.9144, 1.0, "yds yard yards"),
-        rare("mi", Length, 1609.344, 1.0, "mile miles"),
-        unit(
-            "m/s",
-            Speed,
-            1.0,
-            1.0,
-            "mps mpers ms1 mpersec msec meterprosekunde meternprosekunde metresparseconde metrosporsegundo metrialsecondo meterpersecond meterspersecond metrepersecond metrespersecond мс",
-        ),
-        unit(
-            "km/h",
-            Speed,
-            1.0,
-            3.6,
-            "kph kmph kmperh kmh1 kmhr kmperhour kmstd kilometerperhour kilometersperhour kilometreperhour kilometresperhour kilometerprostunde kilometernprostunde kilometresparheure kilometresheure kilometrosporhora chilometriallora chilometriorari kilometerperuur kilometertimmen quilometrosporhora кмч",
-        ),
-        unit("mph", Speed, MILE_PER_HOUR_MPS, 1.0, "miph mih mileperhour milesperhour"),
-        rare("kn", Speed, 1852.0, 3600.0, "kt kts knot knots knoten"),
-        rare("cm/s", Speed, 1.0, 1e2, "cms cmps centimeterspersecond"),
-        rare("mm/s", Speed, 1.0, 1e3, "mms mmps millimeterspersecond"),
-        rare("dm/s", Speed, 1.0, 10.0, "dms decimeterspersecond"),
-        rare("m/min", Speed, 1.0, 60.0, "mmin mpermin metersperminute metresperminute"),
-        rare("ft/s", Speed, 0.3048, 1.0, "fts fps ftpersec feetpersecond"),
-        unit(
-            "m/s2",
-            Acceleration,
-            1.0,
-            1.0,
-            "mps2 mss mpss mpers2 ms msec2 ms2 meterspersecondsquared metrespersecondsquared meterpersecondsquared meterspersecond2",
-        ),
-        rare("g", Acceleration, STANDARD_GRAVITY_MPS2, 1.0, "gn gee standardgravity"),
-        rare("mg", Acceleration, STANDARD_GRAVITY_MPS2, 1e3, "milligee"),
-        rare("cm/s2", Acceleration, 1.0, 1e2, "cms2 gal centimeterspersecondsquared"),
-        rare("km/h/s", Acceleration, 1.0, 3.6, "kmhs kmphps kmphs kphs"),
-        rare("mph/s", Acceleration, MILE_PER_HOUR_MPS, 1.0, "mphs mphps"),
-        rare("ft/s2", Acceleration, 0.3048, 1.0, "fts2 fps2 feetpersecondsquared"),
-        unit("N", Force, 1.0, 1.0, "newton newtons н"),
-        unit("kN", Force, 1e3, 1.0, "kilonewton kilonewtons кн"),
-        unit("MN", Force, 1e6, 1.0, "meganewton meganewtons"),
-        unit("lbf", Force, POUND_FORCE_N, 1.0, "lb lbs poundforce poundsforce poundforces"),
-        rare(
-            "klbf",
-            Force,
-            1e3 * POUND_FORCE_N,
-            1.0,
-            "kip kips klb klbs kilopounds kilopound kilopoundsforce kilopoundforce",
-        ),
-        rare(
-            "kp",
-            Force,
-            STANDARD_GRAVITY_MPS2,
-            1.0,
-            "kgf kilopond kiloponds kilogramforce kilogramsforce кгс",
-        ),
-        rare(
-            "tf",
-            Force,
-            1e3 * STANDARD_GRAVITY_MPS2,
-            1.0,
-            "mp megapond tonneforce tonnesforce metrictonforce metrictonsforce metrictonf тс",
-        ),
-        rare("short tonf", Force, 2e3 * POUND_FORCE_N, 1.0, "ustonf ustonsforce shorttonsforce"),
-        rare("long tonf", Force, 2240.0 * POUND_FORCE_N, 1.0, "uktonf uktonsforce longtonsforce"),
-        rare("daN", Force, 10.0, 1.0, "decanewton decanewtons dekanewton"),
-        unit("Pa", Pressure, 1.0, 1.0, "pascal pascals"),
-        unit("kPa", Pressure, 1e3, 1.0, "kilopascal kilopascals"),
-        unit("bar", Pressure, 1e5, 1.0, "bars barg"),
-        rare("hPa", Pressure, 100.0, 1.0, "hectopascal hectopascals hektopascal"),
-        rare("mbar", Pressure, 100.0, 1.0, "millibar millibars"),
-        rare("MPa", Pressure, 1e6, 1.0, "megapascal megapascals nmm2"),
-        rare("psi", Pressure, 6894.757293168, 1.0, "psig lbfin2"),
-        rare("atm", Pressure, 101_325.0, 1.0, "atmosphere atmospheres"),
-        rare("kgf/cm2", Pressure, 98_066.5, 1.0, "kpcm2 kgcm2 кгссм2"),
-        unit("kg", Mass, 1.0, 1.0, "kilogram kilograms kilogramme kilogrammes kgs"),
-        unit("t", Mass, 1e3, 1.0, "to ton tons tonne tonnes tonnen megagram т"),
-        rare("lb", Mass, 0.45359237, 1.0, "lbs lbm pound pounds"),
-        rare("short ton", Mass, 907.18474, 1.0, "shorttons ustons uston"),
-        rare("long ton", Mass, 1016.0469088, 1.0, "longtons uktons"),
-        unit(
-            "degC",
-            Temperature,
-            1.0,
-            1.0,
-            "c celsius gradc grad cel degreecelsius degreescelsius gradcelsius",
-        ),
-        shifted("K", -273.15, 1.0, 1.0, "kelvin degk"),
-        shifted("degF", -32.0, 5.0, 9.0, "f fahrenheit degreesfahrenheit"),
-        unit(
-            "permille",
-            Ratio,
-            1.0,
-            1e3,
-            "promille permil permill pourmille permille pormil promil mmm mperkm mkm nkn npkn metersperkilometer metresperkilometre",
-        ),
-        unit(
-            "%",
-            Ratio,
-            1.0,
-            1e2,
-            "pct percent prozent pourcent percento porciento procent perc pc m100m ft100ft",
-        ),
-        unit("1", Ratio, 1.0, 1.0, "pu ratio mm fraction share anteil"),
+/// Lists the units by their dimension: a name, with the factor and divisor to the base unit and, for temperatures, what
+/// is added before; spellings in files. A `rare` unit is read where a file says it, and never guessed.
+macro_rules! units {
+    ($( $dimension:ident { $(
+        $kind:ident $name:literal $( shift $shift:literal )? = $multiply:expr, $divide:expr; $spellings:literal
+    )* } )*) => {
+        static UNITS: &[Unit] = &[ $( $( Unit {
+            name: $name,
+            dimension: Dimension::$dimension,
+            shift: 0.0 $( + $shift )?,
+            multiply: $multiply,
+            divide: $divide,
+            spellings: $spellings,
+            is_usual: units!(@$kind),
+        }, )* )* ];
+    };
+    (@usual) => { true };
+    (@rare) => { false };
+}
+
+units! {
+    Time {
+        usual "s" = 1.0, 1.0; "sec secs second seconds sek sekunde sekunden seconde secondes segundo segundos secondi"
+        usual "ms" = 1.0, 1e3; "msec msecs millis millisec millisecond milliseconds millisekunde millisekunden millisecondes"
+        usual "us" = 1.0, 1e6; "usec usecs micros microsecond microseconds mikrosekunden"
+        usual "ns" = 1.0, 1e9; "nsec nanos nanosecond nanoseconds"
+        usual "min" = 60.0, 1.0; "mins minute minutes minuten"
+        usual "h" = 3600.0, 1.0; "hr hrs hour hours std stunden heures"
+        rare "d" = 86_400.0, 1.0; "days datenum serial"
+        rare "100ns" = 1.0, 1e7; "tick ticks filetime"
+    }
+    Length {
+        usual "m" = 1.0, 1.0; "meter meters metre metres mtr metri metros м"
+        usual "km" = 1e3, 1.0; "kilometer kilometers kilometre kilometres chilometri км"
+        usual "mm" = 1.0, 1e3; "millimeter millimeters millimetre millimetres"
+        rare "cm" = 1.0, 1e2; "centimeter centimeters centimetre centimetres"
+        rare "ft" = 0.3048, 1.0; "feet foot"
+        rare "yd" = 0.9144, 1.0; "yds yard yards"
+        rare "mi" = 1609.344, 1.0; "mile miles"
+    }
+    Speed {
+        usual "m/s" = 1.0, 1.0; "mps mpers ms1 mpersec msec meterprosekunde meternprosekunde metresparseconde metrosporsegundo metrialsecondo meterpersecond meterspersecond metrepersecond metrespersecond мс"
+        usual "km/h" = 1.0, 3.6; "kph kmph kmperh kmh1 kmhr kmperhour kmstd kilometerperhour kilometersperhour kilometreperhour kilometresperhour kilometerprostunde kilometernprostunde kilometresparheure kilometresheure kilometrosporhora chilometriallora chilometriorari kilometerperuur kilometertimmen quilometrosporhora кмч"
+        usual "mph" = MILE_PER_HOUR_MPS, 1.0; "miph mih mileperhour milesperhour"
+        rare "kn" = 1852.0, 3600.0; "kt kts knot knots knoten"
+        rare "cm/s" = 1.0, 1e2; "cms cmps centimeterspersecond"
+        rare "mm/s" = 1.0, 1e3; "mms mmps millimeterspersecond"
+        rare "dm/s" = 1.0, 10.0; "dms decimeterspersecond"
+        rare "m/min" = 1.0, 60.0; "mmin mpermin metersperminute metresperminute"
+        rare "ft/s" = 0.3048, 1.0; "fts fps ftpersec feetpersecond"
+    }
+    Acceleration {
+        usual "m/s2" = 1.0, 1.0; "mps2 mss mpss mpers2 ms msec2 ms2 meterspersecondsquared metrespersecondsquared meterpersecondsquared meterspersecond2"
+        rare "g" = STANDARD_GRAVITY_MPS2, 1.0; "gn gee standardgravity"
+        rare "mg" = STANDARD_GRAVITY_MPS2, 1e3; "milligee"
+        rare "cm/s2" = 1.0, 1e2; "cms2 gal centimeterspersecondsquared"
+        rare "km/h/s" = 1.0, 3.6; "kmhs kmphps kmphs kphs"
+        rare "mph/s" = MILE_PER_HOUR_MPS, 1.0; "mphs mphps"
+        rare "ft/s2" = 0.3048, 1.0; "fts2 fps2 feetpersecondsquared"
+    }
+    Force {
+        usual "N" = 1.0, 1.0; "newton newtons н"
+        usual "kN" = 1e3, 1.0; "kilonewton kilonewtons кн"
+        usual "MN" = 1e6, 1.0; "meganewton meganewtons"
+        usual "lbf" = POUND_FORCE_N, 1.0; "lb lbs poundforce poundsforce poundforces"
+        rare "klbf" = 1e3 * POUND_FORCE_N, 1.0; "kip kips klb klbs kilopounds kilopound kilopoundsforce kilopoundforce"
+        rare "kp" = STANDARD_GRAVITY_MPS2, 1.0; "kgf kilopond kiloponds kilogramforce kilogramsforce кгс"
+        rare "tf" = 1e3 * STANDARD_GRAVITY_MPS2, 1.0; "mp megapond tonneforce tonnesforce metrictonforce metrictonsforce metrictonf тс"
+        rare "short tonf" = 2e3 * POUND_FORCE_N, 1.0; "ustonf ustonsforce shorttonsforce"
+        rare "long tonf" = 2240.0 * POUND_FORCE_N, 1.0; "uktonf uktonsforce longtonsforce"
+        rare "daN" = 10.0, 1.0; "decanewton decanewtons dekanewton"
+    }
+    Pressure {
+        usual "Pa" = 1.0, 1.0; "pascal pascals"
+        usual "kPa" = 1e3, 1.0; "kilopascal kilopascals"
+        usual "bar" = 1e5, 1.0; "bars barg"
+        rare "hPa" = 100.0, 1.0; "hectopascal hectopascals hektopascal"
+        rare "mbar" = 100.0, 1.0; "millibar millibars"
+        rare "MPa" = 1e6, 1.0; "megapascal megapascals nmm2"
+        rare "psi" = 6894.757293168, 1.0; "psig lbfin2"
+        rare "atm" = 101_325.0, 1.0; "atmosphere atmospheres"
+        rare "kgf/cm2" = 98_066.5, 1.0; "kpcm2 kgcm2 кгссм2"
+    }
+    Mass {
+        usual "kg" = 1.0, 1.0; "kilogram kilograms kilogramme kilogrammes kgs"
+        usual "t" = 1e3, 1.0; "to ton tons tonne tonnes tonnen megagram т"
+        rare "lb" = 0.45359237, 1.0; "lbs lbm pound pounds"
+        rare "short ton" = 907.18474, 1.0; "shorttons ustons uston"
+        rare "long ton" = 1016.0469088, 1.0; "longtons uktons"
+    }
+    Temperature {
+        usual "degC" = 1.0, 1.0; "c celsius gradc grad cel degreecelsius degreescelsius gradcelsius"
+        usual "K" shift -273.15 = 1.0, 1.0; "kelvin degk"
+        usual "degF" shift -32.0 = 5.0, 9.0; "f fahrenheit degreesfahrenheit"
+    }
+    Ratio {
+        usual "permille" = 1.0, 1e3; "promille permil permill pourmille permille pormil promil mmm mperkm mkm nkn npkn metersperkilometer metresperkilometre"
+        usual "%" = 1.0, 1e2; "pct percent prozent pourcent percento porciento procent perc pc m100m ft100ft"
+        usual "1" = 1.0, 1.0; "pu ratio mm fraction share anteil"
         // A slope's angle, as small as those of railways: its tangent is the angle to 0.2 %.
-        unit("deg", Ratio, std::f64::consts::PI, 180.0, "degree degrees grad degrad winkelgrad"),
-        rare("ft/mi", Ratio, 0.3048, 1609.344, "feetpermile ftpermile ftpermi fpmi"),
-        rare("gon", Ratio, std::f64::consts::PI, 200.0, "gradian gradians neugrad"),
-        rare("rad", Ratio, 1.0, 1.0, "radian radians"),
-        rare("mrad", Ratio, 1.0, 1e3, "milliradian milliradians"),
-        unit("deg", Angle, 1.0, 1.0, "degree degrees grad"),
-        unit("rad", Angle, 180.0, std::f64::consts::PI, "radian radians"),
-        unit("1/m", Curvature, 1.0, 1.0, "perm m1 permeter permetre"),
-        rare("1/km", Curvature, 1.0, 1e3, "perkm km1"),
-        unit("W", Power, 1.0, 1.0, "watt watts"),
-        unit("kW", Power, 1e3, 1.0, "kilowatt kilowatts"),
-        rare("MW", Power, 1e6, 1.0, "megawatt megawatts"),
-        rare("hp", Power, HORSEPOWER_W, 1.0, "bhp horsepower mechanicalhorsepower"),
-        rare(
-            "PS",
-            Power,
-            75.0 * STANDARD_GRAVITY_MPS2,
-            1.0,
-            "cv metrichorsepower pferdestaerke pferdestaerken лс",
-        ),
-        unit("V", Voltage, 1.0, 1.0, "volt volts"),
-        unit("kV", Voltage, 1e3, 1.0, "kilovolt kilovolts"),
-        unit("A", Current, 1.0, 1.0, "amp amps ampere amperes"),
-        unit("kA", Current, 1e3, 1.0, "kiloamp kiloamps kiloampere kiloamperes"),
-        unit("1", Count, 1.0, 1.0, "bool boolean flag count pax persons"),
-    ]
-};
+        usual "deg" = std::f64::consts::PI, 180.0; "degree degrees grad degrad winkelgrad"
+        rare "ft/mi" = 0.3048, 1609.344; "feetpermile ftpermile ftpermi fpmi"
+        rare "gon" = std::f64::consts::PI, 200.0; "gradian gradians neugrad"
+        rare "rad" = 1.0, 1.0; "radian radians"
+        rare "mrad" = 1.0, 1e3; "milliradian milliradians"
+    }
+    Angle {
+        usual "deg" = 1.0, 1.0; "degree degrees grad"
+        usual "rad" = 180.0, std::f64::consts::PI; "radian radians"
+    }
+    Curvature {
+        usual "1/m" = 1.0, 1.0; "perm m1 permeter permetre"
+        rare "1/km" = 1.0, 1e3; "perkm km1"
+    }
+    Power {
+        usual "W" = 1.0, 1.0; "watt watts"
+        usual "kW" = 1e3, 1.0; "kilowatt kilowatts"
+        rare "MW" = 1e6, 1.0; "megawatt megawatts"
+        rare "hp" = HORSEPOWER_W, 1.0; "bhp horsepower mechanicalhorsepower"
+        rare "PS" = 75.0 * STANDARD_GRAVITY_MPS2, 1.0; "cv metrichorsepower pferdestaerke pferdestaerken лс"
+    }
+    Voltage {
+        usual "V" = 1.0, 1.0; "volt volts"
+        usual "kV" = 1e3, 1.0; "kilovolt kilovolts"
+    }
+    Current {
+        usual "A" = 1.0, 1.0; "amp amps ampere amperes"
+        usual "kA" = 1e3, 1.0; "kiloamp kiloamps kiloampere kiloamperes"
+    }
+    Count {
+        usual "1" = 1.0, 1.0; "bool boolean flag count pax persons"
+    }
+}
 
 /// Units of things that a dataset has no quantity for.
 const FOREIGN: &str = "ma mv hz khz rpm umin 1min nm knm kwh wh mwh j kj mj l lmin db ppm kva ohm gwh kvar var \
                        pas m3 m2 m3s kgs kgh lph gpm nms radps degs rads dbm pct100 cd lx mol wm2 wb";
-
-/// Returns the name, dimension, factor and divisor to the base unit, and spellings.
-const fn unit(
-    name: &'static str,
-    dimension: Dimension,
-    multiply: f64,
-    divide: f64,
-    spellings: &'static str,
-) -> Unit {
-    Unit { name, dimension, shift: 0.0, multiply, divide, spellings, is_usual: true }
-}
-
-/// Returns a unit that is read where a file says it, and never guessed.
-const fn rare(
-    name: &'static str,
-    dimension: Dimension,
-    multiply: f64,
-    divide: f64,
-    spellings: &'static str,
-) -> Unit {
-    Unit { is_usual: false, ..unit(name, dimension, multiply, divide, spellings) }
-}
-
-const fn shifted(
-    name: &'static str,
-    shift: f64,
-    multiply: f64,
-    divide: f64,
-    spellings: &'static str,
-) -> Unit {
-    Unit { shift, ..unit(name, Dimension::Temperature, multiply, divide, spellings) }
-}
 
 /// Small letters and digits only.
 fn fold(text: &str) -> String {
@@ -372,7 +314,5 @@ impl Unit {
     }
 }
 
-#[cfg(test)]
-mod spelling_tests;
 #[cfg(test)]
 mod tests;

@@ -16,60 +16,53 @@ pub fn kind_name(name: &str) -> &str {
 
 /// Returns the meaning of a parameter, without its symbol or name, and its unit.
 pub fn parameter(name: &str) -> (&str, &'static str) {
-    match name {
-        "c_factor" => ("factor on c v²", ""),
-        "dc_n_per_mps2" => ("extra drag with the whole train inside", "N/(m/s)²"),
-        "k_n_per_kn_m" => ("curve constant k in k/R", "N/kN · m"),
-        "wind_plus_mps" => ("headwind for travel towards growing chainage", "m/s"),
-        "headwind_mps" => ("headwind", "m/s"),
-        "force_n" => ("drag force", "N"),
-        "speed_scale" => ("measured over true speed", ""),
-        "rms_permille" => ("root mean square of the gradient's error", "‰"),
-        "profile" => ("error of the gradient", "‰"),
-        "shift_m" => ("shift towards growing chainage", "m"),
-        "mass_factor" => ("true over declared mass", ""),
-        "gain" => ("reported over true force", ""),
-        "delay_and_lag_s" => ("dead time and lag together", "s"),
-        "delay_s" => ("dead time", "s"),
-        "lag_s" => ("lag", "s"),
-        "rotating_mass_factor" => ("rotating-mass factor", ""),
-        "delta_a_n_per_kn" => ("extra resistance at the start", "N/kN"),
-        "tau_s" => ("time constant", "s"),
-        "w0_per_k" => ("relative change of resistance", "1/K"),
-        "reference_k" => ("reference temperature", "K"),
-        "extra_n_per_kn" => ("extra resistance", "N/kN"),
-        "gradient_error_permille" => ("error of the gradient", "‰"),
-        "force_error_share" => ("share of the force that is missing", ""),
-        "at" | "second_at" => ("where it is greatest, or its reference", ""),
-        "exponent" | "second_exponent" => ("exponent", ""),
-        "below" | "second_below" => ("acts below", ""),
-        "least" | "second_least" => ("grows no more below", ""),
-        "from" | "second_from" => ("acts from", ""),
-        "until" | "second_until" => ("acts until", ""),
-        "over" | "second_over" => ("fades over", ""),
-        "width" | "second_width" => ("width", ""),
-        "adhesion" => ("adhesion", ""),
-        "achieved_ratio" => ("achieved over reported brake force", ""),
-        other => (other, ""),
-    }
+    let (meaning, unit, _) = row(name);
+    (meaning, unit)
 }
 
 /// Returns the least value of a parameter, below which no interval reaches.
 pub fn least(name: &str) -> f64 {
+    row(name).2
+}
+
+/// Returns the meaning of a parameter, its unit and its least value.
+fn row(name: &str) -> (&str, &'static str, f64) {
+    const ANY: f64 = f64::NEG_INFINITY;
     match name {
-        "c_factor"
-        | "k_n_per_kn_m"
-        | "force_n"
-        | "mass_factor"
-        | "delay_and_lag_s"
-        | "delay_s"
-        | "lag_s"
-        | "rotating_mass_factor"
-        | "delta_a_n_per_kn"
-        | "tau_s"
-        | "adhesion"
-        | "achieved_ratio" => 0.0,
-        _ => f64::NEG_INFINITY,
+        "c_factor" => ("factor on c v²", "", 0.0),
+        "dc_n_per_mps2" => ("extra drag with the whole train inside", "N/(m/s)²", ANY),
+        "k_n_per_kn_m" => ("curve constant k in k/R", "N/kN · m", 0.0),
+        "wind_plus_mps" => ("headwind for travel towards growing chainage", "m/s", ANY),
+        "headwind_mps" => ("headwind", "m/s", ANY),
+        "force_n" => ("drag force", "N", 0.0),
+        "speed_scale" => ("measured over true speed", "", ANY),
+        "rms_permille" => ("root mean square of the gradient's error", "‰", ANY),
+        "profile" => ("error of the gradient", "‰", ANY),
+        "shift_m" => ("shift towards growing chainage", "m", ANY),
+        "mass_factor" => ("true over declared mass", "", 0.0),
+        "gain" => ("reported over true force", "", ANY),
+        "delay_and_lag_s" => ("dead time and lag together", "s", 0.0),
+        "delay_s" => ("dead time", "s", 0.0),
+        "lag_s" => ("lag", "s", 0.0),
+        "rotating_mass_factor" => ("rotating-mass factor", "", 0.0),
+        "delta_a_n_per_kn" => ("extra resistance at the start", "N/kN", 0.0),
+        "tau_s" => ("time constant", "s", 0.0),
+        "w0_per_k" => ("relative change of resistance", "1/K", ANY),
+        "reference_k" => ("reference temperature", "K", ANY),
+        "extra_n_per_kn" => ("extra resistance", "N/kN", ANY),
+        "gradient_error_permille" => ("error of the gradient", "‰", ANY),
+        "force_error_share" => ("share of the force that is missing", "", ANY),
+        "at" | "second_at" => ("where it is greatest, or its reference", "", ANY),
+        "exponent" | "second_exponent" => ("exponent", "", ANY),
+        "below" | "second_below" => ("acts below", "", ANY),
+        "least" | "second_least" => ("grows no more below", "", ANY),
+        "from" | "second_from" => ("acts from", "", ANY),
+        "until" | "second_until" => ("acts until", "", ANY),
+        "over" | "second_over" => ("fades over", "", ANY),
+        "width" | "second_width" => ("width", "", ANY),
+        "adhesion" => ("adhesion", "", 0.0),
+        "achieved_ratio" => ("achieved over reported brake force", "", 0.0),
+        other => (other, "", ANY),
     }
 }
 

@@ -1,15 +1,18 @@
-//! Failures of a command: the words, the place and the exit status.
+//! How a command ends: its failure, with words, place and exit status, or another program that carries it out.
 
+use std::ffi::OsString;
 use std::fmt::Display;
+use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::ExitCode;
 
+use clap::Args;
 use dynocar_dataset::{DatasetError, SourcePosition};
 
 use crate::config::ConfigError;
 use crate::dataset::LoadError;
 use crate::output::{OutputError, report_line, require_file, write_json};
-use crate::programs::{ErrorAnswer, ErrorDocument};
+use crate::programs::{ErrorAnswer, ErrorDocument, call, not_started};
 
 /// Why a command ended without a result; determines the exit status.
 #[derive(Debug)]
@@ -35,6 +38,11 @@ impl Failure {
     /// Returns a failure of the input, in the words of an error.
     pub fn input(error: impl Display) -> Self {
         Failure::Input(error.to_string())
+    }
+
+    /// Returns a failure of an input file, in the words of an error.
+    fn at(path: &Path, message: String) -> Self {
+        Failure::At(SourcePosition::whole(&path.display().to_string()), message)
     }
 
     /// Returns the failure for machines; `None` when the result is reported already.
@@ -105,9 +113,7 @@ impl From<LoadError> for Failure {
             | LoadError::NoSuchPath { path }
             | LoadError::NotADataset { path, .. }
             | LoadError::NoManifest { path, .. }
-            | LoadError::NoRecording { path } => {
-                Failure::At(SourcePosition::whole(&path.display().to_string()), message)
-            }
+            | LoadError::NoRecording { path } => Failure::at(&path, message),
         }
     }
 }
@@ -119,9 +125,40 @@ impl From<ConfigError> for Failure {
             ConfigError::Model(error) => error.into(),
             ConfigError::Unreadable { path, .. }
             | ConfigError::Malformed { path, .. }
-            | ConfigError::OutOfRange { path, .. } => {
-                Failure::At(SourcePosition::whole(&path.display().to_string()), message)
-            }
+            | ConfigError::OutOfRange { path, .. } => Failure::at(&path, message),
         }
     }
+}
+
+/// Arguments after a command that a separate program reads itself.
+#[derive(Debug, Args)]
+#[command(disable_help_flag = true)]
+pub struct Passed {
+    /// Options, as the command's own `--help` lists them
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "OPTIONS")]
+    words: Vec<OsString>,
+}
+
+impl From<Vec<OsString>> for Passed {
+    fn from(words: Vec<OsString>) -> Self {
+        Passed { words }
+    }
+}
+
+/// Returns the arguments after the command.
+pub fn words_of_command() -> Passed {
+    Passed { words: std::env::args_os().skip(2).collect() }
+}
+
+/// Becomes the program that carries out a command, with the command's words.
+///
+/// `package` is the program's name and that of the package it is built from; `command` is the word that
+/// the program knows this command by, where it has several.
+///
+/// # Errors
+///
+/// Only when there is no such program, or it cannot be started.
+pub fn become_it(package: &str, command: Option<&str>, passed: &Passed) -> Result<(), Failure> {
+    let error = call(package).args(command).args(&passed.words).exec();
+    Err(Failure::Work(not_started(package, &error)))
 }

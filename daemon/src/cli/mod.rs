@@ -5,28 +5,26 @@
 //! 1 the work failed, 2 the command line or an input file is wrong; `health` has some of its own.
 
 pub mod check;
-mod companion;
 mod demo;
 mod failure;
-mod groups;
 mod health;
 pub mod models;
 pub mod replay;
 pub mod run;
 pub mod text;
 
+pub use failure::Failure;
+
 use std::ffi::OsString;
+use std::fmt::Write;
 use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 
-pub use failure::Failure;
-
-use self::companion::{Passed, become_it};
-use super::programs::ErrorDocument;
 use crate::output::{OutputError, write_json};
-use crate::programs::{LIVE, RECORDING, WATCH, WORKSHOP};
+use crate::programs::{ErrorDocument, LIVE, RECORDING, WATCH, WORKSHOP};
+use failure::{Passed, become_it};
 
 /// Dynocar, a dynamometer car in software.
 #[derive(Debug, Parser)]
@@ -128,7 +126,7 @@ impl Command {
 
 /// Returns all commands, with the options of those that this program carries out itself.
 pub fn commands() -> clap::Command {
-    groups::grouped(Arguments::command())
+    grouped(Arguments::command())
 }
 
 /// Parses the command line, runs the command, reports a failure on standard error.
@@ -205,5 +203,64 @@ fn parse_by<A: Parser>(
             Err(Failure::from(OutputError::StandardOutput(error)).report(program, None))
         }
         _ => Err(ExitCode::SUCCESS),
+    }
+}
+
+/// Headings and their commands, in the order in which they are printed.
+const GROUPS: [(&str, &[&str]); 5] = [
+    ("Begin", &["demo", "init", "import", "check"]),
+    ("Drive, with a controller", &["run", "health", "replay"]),
+    (
+        "Learn, from recorded runs",
+        &["identify", "explain", "survey", "stops", "brakes", "learn", "models"],
+    ),
+    ("Look, and keep", &["watch", "record", "flight-recorder", "keep", "recover", "convert"]),
+    ("Connect, with other programs", &["live", "fmu", "completions", "man"]),
+];
+
+/// Returns the program's command line with a help that lists its commands in groups.
+fn grouped(command: clap::Command) -> clap::Command {
+    let list = list(&command);
+    command.help_template(format!(
+        "{{about-with-newline}}\n{{usage-heading}} {{usage}}{list}\n\nOptions:\n{{options}}\n\n\
+         dynocar help COMMAND says more of one of them."
+    ))
+}
+
+/// Returns the commands that there are, each with its first sentence, below the headings.
+fn list(command: &clap::Command) -> String {
+    let names = || command.get_subcommands().map(clap::Command::get_name);
+    let width = names().map(str::len).max().unwrap_or_default();
+    let mut list = String::new();
+    for (heading, wanted) in GROUPS {
+        let found: Vec<&clap::Command> =
+            wanted.iter().filter_map(|name| command.find_subcommand(name)).collect();
+        if !found.is_empty() {
+            let _ = write!(list, "\n\n{heading}:");
+        }
+        for it in found {
+            let about = it.get_about().map(ToString::to_string).unwrap_or_default();
+            let _ = write!(list, "\n  {:width$}  {about}", it.get_name());
+        }
+    }
+    list
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_command_is_in_one_group_and_its_first_sentence_fits_a_line() {
+        let command = commands();
+        for it in command.get_subcommands().filter(|it| !it.is_hide_set()) {
+            let name = it.get_name();
+            let count =
+                GROUPS.iter().flat_map(|(_, names)| *names).filter(|it| **it == name).count();
+            assert_eq!(count, 1, "{name} is in {count} groups");
+        }
+        for line in list(&command).lines() {
+            assert!(line.chars().count() <= 100, "{line}");
+        }
     }
 }

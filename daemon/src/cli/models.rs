@@ -11,9 +11,8 @@ use dynocar_shared::TrainId;
 use super::Failure;
 use super::text::short;
 use crate::config::DaemonConfig;
-use crate::models::decision::ModelChoice;
-use crate::models::difference::differences;
-use crate::models::history::{ModelHistory, State};
+use crate::models::history::{ModelHistory, State, differences};
+use crate::models::records::ModelChoice;
 use crate::models::{
     ModelFigure, ModelHash, ModelText, ModelsError, NewDecision, Store, Stored, TrainModels,
     UtcSecond,

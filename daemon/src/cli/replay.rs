@@ -11,11 +11,10 @@ use dynocar_shared::{PipelineKind, TrainId};
 use dynocar_transport::Host;
 
 use super::Failure;
-use super::companion::{Passed, become_it, words_of_command};
+use super::failure::{Passed, become_it, words_of_command};
 use crate::dataset::{self, DatasetSource, LoadError, is_parquet_path};
-use crate::output::report_line;
+use crate::output::{Redrawn, bar, can_draw, report_line};
 use crate::programs::WORKSHOP;
-use crate::redrawn::{Redrawn, bar, can_draw};
 use crate::replay::{Rate, ReplayReport, Replayer};
 
 /// How often progress is shown.

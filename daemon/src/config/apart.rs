@@ -2,8 +2,7 @@
 
 use dynocar_shared::PipelineKind;
 
-use super::error::Checker;
-use super::{ConfigError, PipelineConfig, ThreadConfig};
+use super::{Checker, ConfigError, PipelineConfig, ThreadConfig};
 
 /// The name of a thread that is proposed for slow pipelines.
 const SLOW: &str = "slow";
@@ -14,9 +13,8 @@ pub fn keep_slow_apart(
     pipelines: &[PipelineConfig],
     threads: &[ThreadConfig],
 ) -> Result<(), ConfigError> {
-    let is_slow = |pipeline: &PipelineConfig| is_slow(pipeline.estimator.kind());
-    for slow in pipelines.iter().filter(|pipeline| is_slow(pipeline)) {
-        let mut others = pipelines.iter().filter(|it| it.thread == slow.thread && !is_slow(it));
+    for slow in pipelines.iter().filter(|it| it.is_slow()) {
+        let mut others = pipelines.iter().filter(|it| it.thread == slow.thread && !it.is_slow());
         if let Some(fast) = others.next() {
             let key = format!("pipelines.{}.thread", slow.name);
             let name = &threads[slow.thread].name;
@@ -41,12 +39,11 @@ pub fn names_one(name: &str) -> String {
 /// Returns the lines that give the slow pipelines of a thread one of their own: one that has only such, else a new
 /// one.
 fn own_thread(shared: &str, pipelines: &[PipelineConfig], threads: &[ThreadConfig]) -> String {
-    let is_slow = |pipeline: &PipelineConfig| is_slow(pipeline.estimator.kind());
     let on = |index: usize| pipelines.iter().filter(move |pipeline| pipeline.thread == index);
     // A thread that no table names is one pipeline's alone.
     let is_own = |name: &str| pipelines.iter().any(|pipeline| pipeline.name == name);
     let free = threads.iter().enumerate().find(|(index, thread)| {
-        on(*index).count() > 0 && on(*index).all(is_slow) && !is_own(&thread.name)
+        on(*index).count() > 0 && on(*index).all(PipelineConfig::is_slow) && !is_own(&thread.name)
     });
     let mut lines = String::new();
     let name = match free {
@@ -60,7 +57,7 @@ fn own_thread(shared: &str, pipelines: &[PipelineConfig], threads: &[ThreadConfi
             name
         }
     };
-    let moved = pipelines.iter().filter(|it| threads[it.thread].name == shared && is_slow(it));
+    let moved = pipelines.iter().filter(|it| threads[it.thread].name == shared && it.is_slow());
     let moved = moved.map(|it| {
         let own = if it.name == it.estimator.kind().name() {
             String::new()
@@ -71,6 +68,12 @@ fn own_thread(shared: &str, pipelines: &[PipelineConfig], threads: &[ThreadConfi
         format!("[[pipelines]]\n{own}kind = {kind}\nthread = {thread}")
     });
     lines + &moved.collect::<Vec<_>>().join("\n\n")
+}
+
+impl PipelineConfig {
+    fn is_slow(&self) -> bool {
+        is_slow(self.estimator.kind())
+    }
 }
 
 /// Returns true for an estimator whose step may take longer than a fast pipeline may be held up: one that

@@ -1,4 +1,4 @@
-//! Checks the text of a configuration and makes a [`DaemonConfig`] of it.
+//! A whole configuration, checked from its text.
 
 use std::collections::HashSet;
 use std::net::SocketAddr;
@@ -6,20 +6,90 @@ use std::path::Path;
 use std::sync::Arc;
 
 use dynocar_estimators::EstimatorSettings;
+use dynocar_model::track::Track;
+use dynocar_model::train::TrainModel;
 use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::{PipelineKind, TrainId};
 
-use super::error::Checker;
-use super::raw::{
-    RawConfig, RawMetrics, RawModels, RawPipeline, RawQuantities, RawThread, RawTrain,
-};
+use super::quantities::Answers;
 use super::{
-    Answers, ConfigError, DaemonConfig, IdleStrategy, ModelsConfig, PipelineConfig, StateConfig,
-    ThreadConfig, TrainConfig, apart,
+    Checker, ConfigError, IdleStrategy, ModelsConfig, PipelineConfig, ProcessConfig, RawConfig,
+    RawMetrics, RawModels, RawPipeline, RawQuantities, RawThread, RawTrain, StateConfig,
+    ThreadConfig, USUAL_INTERVAL_S, apart,
 };
-use crate::dataset::LoadError;
+use crate::dataset::{LoadError, read_text};
 use crate::models::{ModelHash, ModelText};
 use crate::shadow::rule::Rule;
+
+/// A train that the daemon serves.
+#[derive(Clone, Debug)]
+pub struct TrainConfig {
+    /// Its number on the channels.
+    pub id: TrainId,
+    /// Declared model.
+    pub model: Arc<TrainModel>,
+    /// The line it runs on, when known.
+    pub track: Option<Arc<Track>>,
+    /// Hash that identifies the model of train and line.
+    pub model_hash: ModelHash,
+    /// Text of the declared model, as its files spell it.
+    pub text: ModelText,
+    /// The models to be tried next to the one in force; those of the store when absent.
+    pub candidates: Option<Vec<ModelHash>>,
+    /// Set of wheels that the train runs on; estimates are not kept across a change. Empty when not given.
+    pub wheel_set: String,
+    /// The pipelines that answer a controller's questions, each by its number.
+    pub answers: Answers,
+}
+
+/// A configuration, checked as a whole.
+#[derive(Clone, Debug)]
+pub struct DaemonConfig {
+    /// The process.
+    pub process: ProcessConfig,
+    /// The trains.
+    pub trains: Vec<TrainConfig>,
+    /// The threads.
+    pub threads: Vec<ThreadConfig>,
+    /// Loopback address that hands out metrics; none when absent.
+    pub metrics: Option<SocketAddr>,
+    /// Estimates that outlive the daemon; none are kept when absent.
+    pub state: Option<StateConfig>,
+    /// The store of models; without it the declared model stays in force.
+    pub models: Option<ModelsConfig>,
+    /// The pipelines, by the number that their snapshots carry.
+    pub pipelines: Vec<PipelineConfig>,
+}
+
+impl DaemonConfig {
+    /// Reads and checks a configuration and the train and track files it names.
+    ///
+    /// # Errors
+    ///
+    /// See [`ConfigError`]; every message names the file and the expected value.
+    pub fn load(path: &Path) -> Result<Self, ConfigError> {
+        let text = read_text(path)
+            .map_err(|problem| ConfigError::Unreadable { path: path.into(), problem })?;
+        DaemonConfig::from_text(path, &text)
+    }
+
+    /// Checks the text of a configuration, and the train and track files it names; `path` is the
+    /// file it came from.
+    ///
+    /// # Errors
+    ///
+    /// See [`ConfigError`].
+    pub fn from_text(path: &Path, text: &str) -> Result<Self, ConfigError> {
+        check(path, text)
+    }
+}
+
+/// Share of the error that a model must gain to count as better, unless set otherwise.
+const USUAL_LEAST_GAIN: f64 = 0.1;
+/// Trips between two mistakes unless set otherwise: twenty years of twenty-seven trips a day.
+const USUAL_TRIPS_BETWEEN_MISTAKES: f64 = 200_000.0;
+/// The most candidates of a train that are on trial at once, unless set otherwise.
+const USUAL_CANDIDATES_MAX: u64 = 2;
 
 /// The most pipeline threads that one sample channel serves.
 const THREADS_MAX: usize = 10;
@@ -262,37 +332,32 @@ fn check_models(checker: &Checker, raw: RawModels) -> Result<ModelsConfig, Confi
         let given = raw.directory.display();
         return checker.refuse("models.directory", given, "an existing directory");
     }
-    let is_within = |value: f64, low: f64, high: f64| (low..=high).contains(&value);
-    if !is_within(raw.least_gain, 0.0, 0.9) {
+    let least_gain = raw.least_gain.unwrap_or(USUAL_LEAST_GAIN);
+    if !(0.0..=0.9).contains(&least_gain) {
         let allowed = "a share of the error, 0 to 0.9";
-        return checker.refuse("models.least_gain", raw.least_gain, allowed);
+        return checker.refuse("models.least_gain", least_gain, allowed);
     }
-    if !is_within(raw.trips_between_mistakes, 20.0, 1e12) {
-        let (key, given) = ("models.trips_between_mistakes", raw.trips_between_mistakes);
-        return checker.refuse(key, given, "20 to 1e12 trips");
+    let trips_between_mistakes = raw.trips_between_mistakes.unwrap_or(USUAL_TRIPS_BETWEEN_MISTAKES);
+    if !(20.0..=1e12).contains(&trips_between_mistakes) {
+        let key = "models.trips_between_mistakes";
+        return checker.refuse(key, trips_between_mistakes, "20 to 1e12 trips");
     }
     for (key, [low, high]) in &raw.bounds {
         if !(low.is_finite() && high.is_finite() && low <= high) {
-            let key = format!("models.bounds.{key:?}");
-            return checker.refuse(
-                key,
-                format!("[{low}, {high}]"),
-                "the least value, then the greatest",
-            );
+            let (key, given) = (format!("models.bounds.{key:?}"), format!("[{low}, {high}]"));
+            return checker.refuse(key, given, "the least value, then the greatest");
         }
     }
     check_core(checker, "models.core", raw.core)?;
+    let candidates_max = raw.candidates_max.unwrap_or(USUAL_CANDIDATES_MAX);
+    let interval_s = raw.interval_s.unwrap_or(USUAL_INTERVAL_S);
+    let RawModels { adopt, core, bounds, .. } = raw;
     Ok(ModelsConfig {
         directory,
-        rule: Rule {
-            adopt: raw.adopt,
-            least_gain: raw.least_gain,
-            trips_between_mistakes: raw.trips_between_mistakes,
-            bounds: raw.bounds,
-        },
-        candidates_max: checker.range("models.candidates_max", raw.candidates_max, 0, 8)? as usize,
-        core: raw.core,
-        interval_s: checker.range("models.interval_s", raw.interval_s, 1, 3_600)?,
+        rule: Rule { adopt, least_gain, trips_between_mistakes, bounds },
+        candidates_max: checker.range("models.candidates_max", candidates_max, 0, 8)? as usize,
+        core,
+        interval_s: checker.range("models.interval_s", interval_s, 1, 3_600)?,
     })
 }
 

@@ -1,11 +1,9 @@
 //! The pipeline that answers each of a controller's questions, for each train.
 
-use dynocar_core::pipeline::quantities::candidates;
+use dynocar_core::pipeline::output::candidates;
 use dynocar_shared::{Quantity, TrainId};
 
-use super::error::Checker;
-use super::raw::RawQuantities;
-use super::{ConfigError, PipelineConfig};
+use super::{Checker, ConfigError, PipelineConfig, RawQuantities};
 
 /// The pipelines that answer a train's controller, each by its number in the configuration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

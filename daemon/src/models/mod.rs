@@ -14,28 +14,20 @@
 //! # Layout
 //!
 //! - [`text`]: a model's files as text, and their hash
-//! - [`moment`]: a time in UTC
 //! - [`origin`]: where a model came from; maintenance events
-//! - [`numbered`]: records with numbers: decisions, events
-//! - [`decision`]: decisions on models, and the resulting model in force
+//! - [`records`]: records with numbers: decisions on models, with the resulting model in force, and events
 //! - [`store`]: the directory
-//! - [`history`]: the present state of each model
-//! - [`difference`]: the keys in which two models differ
+//! - [`history`]: the present state of each model, and the keys in which two models differ
 
-pub mod decision;
-pub mod difference;
-mod error;
 pub mod history;
-pub mod moment;
-pub mod numbered;
 pub mod origin;
+pub mod records;
 pub mod store;
 pub mod text;
 
-pub use decision::{Action, Decision, NewDecision};
-pub use error::ModelsError;
+pub use crate::stamp::UtcSecond;
 pub use history::{ModelHistory, State};
-pub use moment::UtcSecond;
 pub use origin::{FoundEffect, MaintenanceEvent, ModelFigure, Origin};
+pub use records::{Action, Decision, ModelsError, NewDecision};
 pub use store::{Listing, NewModel, Store, Stored, TrainModels};
 pub use text::{ModelHash, ModelText};

@@ -6,8 +6,8 @@ use dynocar_model::words;
 use dynocar_shared::HALF_95;
 use serde::{Deserialize, Serialize};
 
-use super::moment::UtcSecond;
 use super::text::ModelHash;
+use crate::stamp::UtcSecond;
 
 /// A number with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

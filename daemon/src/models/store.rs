@@ -8,12 +8,13 @@ use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::TrainId;
 
-use super::decision::{Action, Decision, ModelChoice, NewDecision, in_force_after};
-use super::error::ModelsError;
-use super::moment::UtcSecond;
-use super::numbered::{self, Numbered, names_in, read_record, text_of};
 use super::origin::{MaintenanceEvent, Origin};
+use super::records::{
+    self, Action, Decision, ModelChoice, ModelsError, NewDecision, Numbered, in_force_after,
+    names_in, read_record, text_of,
+};
 use super::text::{ModelHash, ModelText, TRACK_FILE, TRAIN_FILE};
+use crate::stamp::UtcSecond;
 use crate::storage::{Disk, Storage, make_once, part_of};
 
 /// Where a model came from, in its folder.
@@ -220,7 +221,7 @@ impl TrainModels {
     ///
     /// When one cannot be read.
     pub fn decisions(&self) -> Result<Vec<Numbered<Decision>>, ModelsError> {
-        numbered::read_all(&self.folder.join(DECISIONS))
+        records::read_all(&self.folder.join(DECISIONS))
     }
 
     /// Returns the model in force after the last decision; `None` for the declared model.
@@ -246,7 +247,7 @@ impl TrainModels {
             let decisions = self.decisions()?;
             let decision = self.decision(new, &decisions)?;
             let number = decisions.last().map_or(1, |(number, _)| number + 1);
-            if numbered::write(&Disk, &self.folder.join(DECISIONS), number, &decision)? {
+            if records::write(&Disk, &self.folder.join(DECISIONS), number, &decision)? {
                 return Ok(number);
             }
             // Somebody else decided meanwhile: the decision is checked anew.
@@ -310,7 +311,7 @@ impl TrainModels {
         let folder = self.folder.join(EVENTS);
         loop {
             let last = self.events()?.last().map_or(0, |(number, _)| *number);
-            if numbered::write(&Disk, &folder, last + 1, event)? {
+            if records::write(&Disk, &folder, last + 1, event)? {
                 return Ok(last + 1);
             }
         }
@@ -322,7 +323,7 @@ impl TrainModels {
     ///
     /// When one cannot be read.
     pub fn events(&self) -> Result<Vec<Numbered<MaintenanceEvent>>, ModelsError> {
-        numbered::read_all(&self.folder.join(EVENTS))
+        records::read_all(&self.folder.join(EVENTS))
     }
 
     fn folder_of(&self, hash: ModelHash) -> PathBuf {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use dynocar_core::plausibility::InputFault;
+use dynocar_core::plausibility::{DetectedFault, InputFault};
 use dynocar_core::remedy::{of_reason, of_refusal};
 use dynocar_shared::snapshot::REJECTION_REASONS;
 use dynocar_shared::vocabulary::{EffectKind, KindRow};
@@ -13,8 +13,8 @@ use dynocar_transport::channel::SampleCount;
 use dynocar_transport::{Announcement, ChannelError, Host, Peer, Role, monotonic_now_ns};
 use tracing::{info, warn};
 
-use super::status_log::{RefusalLog, StatusAndReason, StatusLog};
-use super::tally::{Tally, TallyReading};
+use super::worker::PipelineReport;
+use crate::log::{RefusalLog, StatusAndReason, StatusLog};
 use crate::observing::ObservedTrain;
 use crate::operator::{Suspicion, refusals, refused_words};
 use crate::supervision::health::Verdict;
@@ -32,8 +32,8 @@ pub struct WatchedPipeline {
     pub train: TrainId,
     /// Number in the configuration.
     pub index: u32,
-    /// Counters of its thread.
-    pub tally: Arc<Tally>,
+    /// Counts and details from its thread.
+    pub report: PipelineReport,
 }
 
 /// State of the log of one pipeline.
@@ -41,7 +41,9 @@ struct PipelineLog {
     pipeline: WatchedPipeline,
     statuses: StatusLog,
     suspects: StatusLog,
-    last: TallyReading,
+    /// Input fault of the last look.
+    implausible: Option<DetectedFault>,
+    unsent: u64,
     lost: u64,
 }
 
@@ -56,7 +58,7 @@ struct TrainLog {
     controller: Option<Option<Announcement>>,
 }
 
-/// Watches signals, peers, snapshots and tallies, and logs the changes.
+/// Watches signals, peers, snapshots, tallies and details, and logs the changes.
 pub struct RuntimeWatch {
     host: Host,
     /// Start of the daemon, by which its snapshots differ from those of one before it.
@@ -82,7 +84,7 @@ impl RuntimeWatch {
         });
         let pipelines = pipelines.into_iter().map(|pipeline| {
             let (statuses, suspects) = (StatusLog::new(now), StatusLog::new(now));
-            PipelineLog { pipeline, statuses, suspects, last: TallyReading::default(), lost: 0 }
+            PipelineLog { pipeline, statuses, suspects, implausible: None, unsent: 0, lost: 0 }
         });
         let (trains, pipelines) = (trains.collect(), pipelines.collect());
         RuntimeWatch { host, epoch, trains, pipelines, failure: None }
@@ -143,14 +145,14 @@ impl RuntimeWatch {
     fn report_changes(&mut self) {
         self.poll();
         // Once for all pipelines of a train.
-        let known = |log: &PipelineLog| Some((log.pipeline.train, log.last.implausible?.fault));
+        let known = |log: &PipelineLog| Some((log.pipeline.train, log.implausible?.fault));
         let mut reported: Vec<(TrainId, InputFault)> =
             self.pipelines.iter().filter_map(known).collect();
         let now = Instant::now();
         for train in &mut self.trains {
             let mut refused = [0; REJECTION_REASONS];
             for log in self.pipelines.iter_mut().filter(|it| it.pipeline.train == train.id) {
-                log.report_tally(&mut reported);
+                log.report_beyond_snapshots(&mut reported);
                 let snapshot = train.snapshot(log.pipeline.index, self.epoch);
                 let Some(snapshot) = snapshot else { continue };
                 log.report(&snapshot, now);
@@ -195,21 +197,22 @@ impl TrainLog {
 
 impl PipelineLog {
     /// Logs news that no snapshot carries.
-    fn report_tally(&mut self, reported: &mut Vec<(TrainId, InputFault)>) {
-        let reading = self.pipeline.tally.read();
+    fn report_beyond_snapshots(&mut self, reported: &mut Vec<(TrainId, InputFault)>) {
+        let PipelineReport { tally, details } = &self.pipeline.report;
+        let (implausible, unsent) = (details.implausible(), tally.unsent());
         let (name, train) = (self.pipeline.name.as_str(), self.pipeline.train);
-        if let Some(detected) = reading.implausible
+        if let Some(detected) = implausible
             && !reported.contains(&(train, detected.fault))
         {
             reported.push((train, detected.fault));
             let (train, code) = (train.0, detected.fault.name());
             warn!(train, code, "the samples cannot be true: {detected}");
         }
-        if reading.unsent > self.last.unsent {
-            let (train, unsent) = (train.0, reading.unsent - self.last.unsent);
+        if unsent > self.unsent {
+            let (train, unsent) = (train.0, unsent - self.unsent);
             warn!(pipeline = name, train, unsent, "snapshots the transport did not take");
         }
-        self.last = reading;
+        (self.implausible, self.unsent) = (implausible, unsent);
     }
 
     /// Logs news of a pipeline's status, its lost samples and its suspicion.
@@ -236,7 +239,7 @@ impl PipelineLog {
             return;
         };
         let (suspect, force) = (suspicion.name(), suspicion.force());
-        let position_m = self.last.position_m;
+        let position_m = self.pipeline.report.details.position_m();
         let near_km = position_m.is_finite().then_some(1e-3 * position_m);
         let near_km = near_km.map(|it| format!("{it:.3}"));
         let remedy = KindRow::of(suspicion.effect.unwrap_or(EffectKind::Unknown)).to_do;

@@ -1,17 +1,15 @@
 //! The threads of the daemon.
 //!
-//! - [`worker`]: a pipeline thread, from sample to snapshot
+//! - [`worker`]: a pipeline thread, from sample to snapshot; idle strategies while no sample comes
 //! - [`exchange`]: pipelines of another model on their way to a thread, and the old ones on their way back
-//! - [`idle`]: idle strategies while no sample comes
 //! - [`system`]: the requests of a thread to the system: a core, a real-time priority, resident memory
-//! - [`status_log`]: which changes of status and suspicion, and which refused samples, the log reports
-//! - [`tally`]: the reports of a pipeline thread to the main thread, for which neither waits
+//! - [`tally`]: signs of life and counts of a pipeline thread, for which neither it nor the main thread waits
+//! - [`log_details`]: the input fault and the position that the log reports and no snapshot carries
 //! - [`main_thread`]: the work of the main thread: signals, peers, the log
 
 pub mod exchange;
-pub mod idle;
+pub mod log_details;
 pub mod main_thread;
-pub mod status_log;
 pub mod system;
 pub mod tally;
 pub mod worker;

@@ -1,10 +1,9 @@
-//! Counts that a pipeline thread reports to the main thread in addition to its snapshots, without waiting on either
-//! side.
+//! Signs of life and counts that a pipeline thread reports to the main thread in addition to its snapshots, without
+//! waiting on either side.
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use crossbeam_utils::CachePadded;
-use dynocar_core::plausibility::{DetectedFault, InputFault};
 
 /// Counters of one pipeline for one train, written by its thread, read by the main thread.
 #[derive(Debug, Default)]
@@ -16,22 +15,6 @@ pub struct Tally {
 struct Counters {
     beats: AtomicU64,
     unsent: AtomicU64,
-    implausible: AtomicU64,
-    /// Position of the train in m.
-    position_m: AtomicU64,
-}
-
-/// A tally at one moment.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct TallyReading {
-    /// Changes with every sign of life of the pipeline's thread.
-    pub beats: u64,
-    /// Snapshots that the transport did not take.
-    pub unsent: u64,
-    /// Recent input fault of the samples, with its factor; a snapshot carries only the reason.
-    pub implausible: Option<DetectedFault>,
-    /// Where the train is, in m; no number where it does not know.
-    pub position_m: f64,
 }
 
 impl Tally {
@@ -39,16 +22,10 @@ impl Tally {
     ///
     /// # Real-time
     ///
-    /// Plain stores into memory that only this thread writes.
-    pub fn note(&self, implausible: Option<DetectedFault>) {
-        self.counters.implausible.store(packed(implausible), Relaxed);
-        let beats = self.counters.beats.load(Relaxed).wrapping_add(1);
+    /// Plain loads and stores of memory that only this thread writes.
+    pub fn note_beat(&self) {
+        let beats = self.beats().wrapping_add(1);
         self.counters.beats.store(beats, Relaxed);
-    }
-
-    /// Notes where the train is, in m; no number where it does not know.
-    pub fn note_position(&self, position_m: f64) {
-        self.counters.position_m.store(position_m.to_bits(), Relaxed);
     }
 
     /// Counts a snapshot that the transport did not take.
@@ -56,28 +33,15 @@ impl Tally {
         self.counters.unsent.fetch_add(1, Relaxed);
     }
 
-    /// Returns the counters now.
-    pub fn read(&self) -> TallyReading {
-        TallyReading {
-            beats: self.counters.beats.load(Relaxed),
-            unsent: self.counters.unsent.load(Relaxed),
-            implausible: unpacked(self.counters.implausible.load(Relaxed)),
-            position_m: f64::from_bits(self.counters.position_m.load(Relaxed)),
-        }
+    /// Returns a number that changes with every sign of life of the pipeline's thread.
+    pub fn beats(&self) -> u64 {
+        self.counters.beats.load(Relaxed)
     }
-}
 
-/// Returns a detected fault in one word: the input fault's number, and its factor in single precision.
-fn packed(detected: Option<DetectedFault>) -> u64 {
-    let word = |it: DetectedFault| {
-        u64::from(it.fault as u8) << 32 | u64::from((it.factor as f32).to_bits())
-    };
-    detected.map_or(0, word)
-}
-
-fn unpacked(word: u64) -> Option<DetectedFault> {
-    let fault = InputFault::from_number((word >> 32) as u8)?;
-    Some(DetectedFault { fault, factor: f64::from(f32::from_bits(word as u32)) })
+    /// Returns the number of snapshots that the transport did not take.
+    pub fn unsent(&self) -> u64 {
+        self.counters.unsent.load(Relaxed)
+    }
 }
 
 #[cfg(test)]
@@ -85,14 +49,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_thread_notes_is_read_again() {
+    fn what_a_thread_counts_is_read_by_another() {
         let tally = Tally::default();
-        assert_eq!(tally.read(), TallyReading::default());
-        let implausible = Some(DetectedFault { fault: InputFault::BrakeScale, factor: -0.5 });
-        tally.note(implausible);
-        tally.note_position(3_214.0);
+        assert_eq!((tally.beats(), tally.unsent()), (0, 0));
+        tally.note_beat();
+        tally.note_beat();
         tally.note_unsent();
-        let expected = TallyReading { beats: 1, unsent: 1, implausible, position_m: 3_214.0 };
-        assert_eq!(tally.read(), expected);
+        assert_eq!((tally.beats(), tally.unsent()), (2, 1));
     }
 }

@@ -1,7 +1,8 @@
-//! A pipeline thread, from sample to snapshot.
+//! A pipeline thread, from sample to snapshot, and its idle strategies.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use dynocar_core::pipeline::Pipeline;
 use dynocar_core::pipeline::motion::STANDING_MPS;
@@ -10,7 +11,7 @@ use dynocar_transport::channel::{Receiver, SampleCount, Sender, Sleeper, Transpo
 use dynocar_transport::{ChannelError, Host, monotonic_now_ns};
 
 use super::exchange::Exchange;
-use super::idle::Idler;
+use super::log_details::LogDetails;
 use super::tally::Tally;
 use crate::config::{IdleStrategy, ThreadConfig};
 
@@ -47,16 +48,25 @@ pub struct ChannelPlan {
     pub count: Arc<SampleCount>,
     /// The thread's number among those that serve the train.
     pub index: usize,
-    /// The pipelines, each with the tally it writes.
-    pub pipelines: Vec<(Pipeline, Arc<Tally>)>,
+    /// The pipelines, each with the words that its thread writes and the main thread reads.
+    pub pipelines: Vec<(Pipeline, PipelineReport)>,
     /// By which pipelines of another model come, when any may come; the thread's seat is its place.
     pub exchange: Option<Arc<Exchange>>,
+}
+
+/// Words of one pipeline that its thread writes and the main thread reads; neither waits.
+#[derive(Clone, Debug, Default)]
+pub struct PipelineReport {
+    /// Signs of life and counts.
+    pub tally: Arc<Tally>,
+    /// Details for the log.
+    pub details: Arc<LogDetails>,
 }
 
 struct Slot {
     pipeline: Pipeline,
     sender: Sender<ParameterSnapshot>,
-    tally: Arc<Tally>,
+    report: PipelineReport,
     last_vouched_ns: i64,
 }
 
@@ -224,7 +234,7 @@ impl TrainChannel {
 impl Slot {
     fn process(&mut self, sample: &TrainSample, epoch: u64) {
         self.pipeline.process(sample);
-        self.tally.note_position(sample.get(SampleField::Position).unwrap_or(f64::NAN));
+        self.report.details.note_position(sample.get(SampleField::Position).unwrap_or(f64::NAN));
         let now_ns = monotonic_now_ns();
         self.publish(epoch, now_ns);
     }
@@ -242,9 +252,10 @@ impl Slot {
         snapshot.vouched_ns = now_ns;
         self.last_vouched_ns = now_ns;
         if self.sender.send(snapshot).is_err() {
-            self.tally.note_unsent();
+            self.report.tally.note_unsent();
         }
-        self.tally.note(self.pipeline.implausible());
+        self.report.details.note_implausible(self.pipeline.implausible());
+        self.report.tally.note_beat();
     }
 }
 
@@ -261,10 +272,10 @@ fn open_channel_of(
     let slots = plan
         .pipelines
         .into_iter()
-        .map(|(mut pipeline, tally)| {
+        .map(|(mut pipeline, report)| {
             pipeline.count_from(counted_from);
             let sender = transport.sender::<ParameterSnapshot>(plan.train)?;
-            let mut slot = Slot { pipeline, sender, tally, last_vouched_ns: 0 };
+            let mut slot = Slot { pipeline, sender, report, last_vouched_ns: 0 };
             slot.publish(epoch, monotonic_now_ns());
             Ok(slot)
         })
@@ -289,4 +300,57 @@ fn look_once_more(channels: &mut [TrainChannel]) -> bool {
         any |= channel.found.is_some();
     }
     any
+}
+
+/// Decides, between two polls for samples, whether to poll again at once or to sleep.
+pub struct Idler {
+    spin_ns: i64,
+    last_work_ns: i64,
+    /// `None` for a thread that never sleeps.
+    sleeper: Option<Sleeper>,
+    sleep_max: Duration,
+}
+
+impl Idler {
+    /// Returns an idler; `sleeper` puts the thread to sleep, unless it never sleeps.
+    pub fn new(
+        strategy: IdleStrategy,
+        spin_us: u64,
+        heartbeat_ms: u64,
+        sleeper: Option<Sleeper>,
+    ) -> Self {
+        let spin_us = match strategy {
+            IdleStrategy::Busy => u64::MAX,
+            IdleStrategy::Adaptive => spin_us,
+            IdleStrategy::Event => 0,
+        };
+        Idler {
+            spin_ns: i64::try_from(spin_us.saturating_mul(1_000)).unwrap_or(i64::MAX),
+            last_work_ns: 0,
+            sleeper: sleeper.filter(|_| strategy != IdleStrategy::Busy),
+            sleep_max: Duration::from_millis(heartbeat_ms),
+        }
+    }
+
+    /// Remembers that there was work at this time.
+    pub fn had_work(&mut self, now_ns: i64) {
+        self.last_work_ns = now_ns;
+    }
+
+    /// Returns at once or after a sleep; `has_work` is asked once more before falling asleep.
+    pub fn pause(&mut self, now_ns: i64, has_work: impl FnOnce() -> bool) {
+        match &mut self.sleeper {
+            Some(sleeper) if now_ns.saturating_sub(self.last_work_ns) >= self.spin_ns => {
+                sleeper.sleep(self.sleep_max, has_work);
+            }
+            _ => {}
+        }
+    }
+
+    /// Speaks up to controllers that have come since.
+    pub fn serve_newcomers(&self) {
+        if let Some(sleeper) = &self.sleeper {
+            sleeper.serve_newcomers();
+        }
+    }
 }

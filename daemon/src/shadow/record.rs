@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use dynocar_core::trial::Ledger;
 use dynocar_core::trial::evidence::{RATIO_MAX, RivalEvidence};
-use dynocar_core::trial::ledger::Ledger;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Parameter, ParameterSnapshot};
 use serde::{Deserialize, Serialize};

@@ -6,14 +6,15 @@ use dynocar_core::trial::Rival;
 use serde::Deserialize;
 use toml::Table;
 
-use crate::models::decision::ModelChoice;
+use crate::models::records::ModelChoice;
 use crate::models::{Action, ModelHash, ModelText, ModelsError, TrainModels};
 
 /// Who adopts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Adopt {
     /// A person, by `dynocar models adopt`; the log says when a rival is better.
+    #[default]
     Ask,
     /// The rule, as soon as there is evidence enough.
     WhenBetter,
@@ -91,7 +92,7 @@ pub fn standing(
 ) -> Result<ModelStanding, ModelsError> {
     let decisions = models.decisions()?;
     let mut stack = vec![declared];
-    stack.extend(crate::models::decision::in_force_after(decisions.iter().map(|(_, it)| it)));
+    stack.extend(crate::models::records::in_force_after(decisions.iter().map(|(_, it)| it)));
     let in_force = stack.pop().unwrap_or(declared);
     let before = stack.pop();
     let is_rejected = |hash: ModelHash| {

@@ -7,17 +7,15 @@ use std::time::{Instant, SystemTime};
 use dynocar_core::pipeline::Pipeline;
 use dynocar_core::pipeline::motion::STANDING_MPS;
 use dynocar_core::trial::evidence::RivalEvidence;
-use dynocar_core::trial::ledger::OpenLoop;
-use dynocar_core::trial::{ModelTrials, Rival};
+use dynocar_core::trial::{ModelTrials, OpenLoop, Rival};
 use dynocar_shared::TrainSample;
 use tracing::{info, warn};
 
 use super::in_force::{self, with_model};
 use super::record::{self, RivalEstimate, TrialFigures, TriedModel, ratio_in_words};
 use super::rule::{Adopt, ModelStanding, Rule, standing};
-use crate::config::{ModelsConfig, PipelineConfig, TrainConfig};
+use crate::config::{ModelsConfig, PipelineConfig, SettingRefused, TrainConfig, build_pipeline};
 use crate::models::{ModelHash, ModelsError, NewDecision, TrainModels, UtcSecond};
-use crate::pipelines::{SettingRefused, build_pipeline};
 use crate::runtime::exchange::{Exchange, Set};
 
 /// A pipeline of the configuration, and which of the threads that serve the train runs it.

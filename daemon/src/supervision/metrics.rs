@@ -23,89 +23,54 @@ type Labels = Vec<(&'static str, String)>;
 type Gauges = Family<Labels, Gauge<f64, AtomicU64>>;
 type Counters = Family<Labels, Counter>;
 
-/// The families of one answer.
-#[derive(Default)]
-struct Families {
-    used: Counters,
-    rejected: Counters,
-    lost: Counters,
-    updates: Counters,
-    resets: Counters,
-    status: Gauges,
-    usable: Gauges,
-    use_state: Gauges,
-    vouched_age: Gauges,
-    latency: Gauges,
-    value: Gauges,
-    deviation: Gauges,
-    innovation: Gauges,
-    unexplained: Gauges,
-    suspected: Gauges,
-    attention: Gauges,
-    in_force: Gauges,
-    trial_error: Gauges,
-    trial_ratio: Gauges,
-    trial_evidence: Gauges,
-    trial_trips: Gauges,
-    maintenance: Counters,
+/// Declares the families of one answer: each with its name without the prefix and its help.
+macro_rules! families {
+    ($( $of:ident { $( $member:ident = $name:literal $help:literal; )* } )*) => {
+        #[derive(Default)]
+        struct Families { $( $( $member: $of, )* )* }
+
+        impl Families {
+            /// Names, each with the type of its family.
+            #[cfg(test)]
+            const NAMES: &[(&str, &str)] = &[ $( $( ($name, stringify!($of)), )* )* ];
+
+            fn register(&self, registry: &mut Registry) {
+                $( $( registry.register($name, $help, self.$member.clone()); )* )*
+            }
+        }
+    };
+}
+
+families! {
+    Counters {
+        used = "samples_used" "Samples that entered the estimate";
+        rejected = "samples_rejected" "Samples refused, by reason";
+        lost = "samples_lost" "Samples that never arrived";
+        updates = "updates" "Windows or segments that updated the estimate";
+        resets = "resets" "Resets of the estimate";
+        maintenance = "maintenance_events" "Maintenance events, by kind";
+    }
+    Gauges {
+        status = "status" "1 for the status that holds";
+        usable = "quantity_usable" "1 while a controller may use the quantity that the pipeline answers";
+        use_state = "quantity_use" "1 for the state of use that holds, and why";
+        vouched_age = "vouched_age_seconds" "Time since the snapshot was vouched for";
+        latency = "latency_seconds" "From sample to snapshot, the newest";
+        value = "parameter_value" "Value in the parameter's unit";
+        deviation = "parameter_std" "Standard deviation in the parameter's unit";
+        innovation = "innovation_mean_square" "1 when the model holds";
+        unexplained = "unexplained_force_newtons" "Force that the model lacks";
+        suspected = "suspected_seconds" "How long the effect has been suspected";
+        attention = "attention" "1 where a person is wanted, 0 where not, with the reason";
+        in_force = "model_in_force" "1 for the model in force, 0 for one on trial";
+        trial_error = "model_error_mps" "Open-loop error of the model over 60 s";
+        trial_ratio = "model_error_ratio" "Error of the model over that of the one in force: ends of an interval of 95 %";
+        trial_evidence = "model_evidence" "Evidence that the model is better";
+        trial_trips = "model_trips" "Trips over which the model was compared";
+    }
 }
 
 impl Families {
-    /// Returns the name without the prefix, help and family of every counter.
-    fn counters(&self) -> [(&'static str, &'static str, &Counters); 6] {
-        [
-            ("samples_used", "Samples that entered the estimate", &self.used),
-            ("samples_rejected", "Samples refused, by reason", &self.rejected),
-            ("samples_lost", "Samples that never arrived", &self.lost),
-            ("updates", "Windows or segments that updated the estimate", &self.updates),
-            ("resets", "Resets of the estimate", &self.resets),
-            ("maintenance_events", "Maintenance events, by kind", &self.maintenance),
-        ]
-    }
-
-    /// Returns the same of every gauge.
-    fn gauges(&self) -> [(&'static str, &'static str, &Gauges); 16] {
-        [
-            ("status", "1 for the status that holds", &self.status),
-            (
-                "quantity_usable",
-                "1 while a controller may use the quantity that the pipeline answers",
-                &self.usable,
-            ),
-            ("quantity_use", "1 for the state of use that holds, and why", &self.use_state),
-            ("vouched_age_seconds", "Time since the snapshot was vouched for", &self.vouched_age),
-            ("latency_seconds", "From sample to snapshot, the newest", &self.latency),
-            ("parameter_value", "Value in the parameter's unit", &self.value),
-            ("parameter_std", "Standard deviation in the parameter's unit", &self.deviation),
-            ("innovation_mean_square", "1 when the model holds", &self.innovation),
-            ("unexplained_force_newtons", "Force that the model lacks", &self.unexplained),
-            ("suspected_seconds", "How long the effect has been suspected", &self.suspected),
-            (
-                "attention",
-                "1 where a person is wanted, 0 where not, with the reason",
-                &self.attention,
-            ),
-            ("model_in_force", "1 for the model in force, 0 for one on trial", &self.in_force),
-            ("model_error_mps", "Open-loop error of the model over 60 s", &self.trial_error),
-            (
-                "model_error_ratio",
-                "Error of the model over that of the one in force: ends of an interval of 95 %",
-                &self.trial_ratio,
-            ),
-            ("model_evidence", "Evidence that the model is better", &self.trial_evidence),
-            ("model_trips", "Trips over which the model was compared", &self.trial_trips),
-        ]
-    }
-
-    fn register(&self, registry: &mut Registry) {
-        for (name, help, family) in self.counters() {
-            registry.register(name, help, family.clone());
-        }
-        for (name, help, family) in self.gauges() {
-            registry.register(name, help, family.clone());
-        }
-    }
-
     fn take_trial(&self, it: &TrialFigures) {
         let labels: Labels = vec![("train", it.train.to_string()), ("model", it.model.to_string())];
         self.in_force.get_or_create(&labels).set(f64::from(u8::from(it.is_in_force)));
@@ -227,10 +192,11 @@ mod tests {
 
     #[test]
     fn every_metric_that_alerts_and_dashboard_name_is_given_and_the_dashboard_names_all() {
-        let families = Families::default();
-        let counters = families.counters().map(|it| format!("{}_total", it.0));
-        let gauges = families.gauges().map(|it| it.0.to_owned());
-        let given: BTreeSet<String> = counters.into_iter().chain(gauges).collect();
+        let full_name = |&(name, of): &(&str, &str)| match of {
+            "Counters" => format!("{name}_total"),
+            _ => name.to_owned(),
+        };
+        let given: BTreeSet<String> = Families::NAMES.iter().map(full_name).collect();
         let alerts = named("config/live/prometheus_alerts.yml");
         let shown = named("config/live/grafana_dashboard.json");
         let told = named("docs/guides/off_board.md");

@@ -96,7 +96,7 @@ impl<'a> Watchdog<'a> {
         let (seen, fed) = &mut *self.state.borrow_mut();
         let mut all_alive = true;
         for ((name, tally), seen) in self.pipelines.iter().zip(seen) {
-            let beats = tally.read().beats;
+            let beats = tally.beats();
             if beats != seen.beats {
                 *seen = SeenAlive { beats, at: now, is_missed: false };
             } else if now.duration_since(seen.at) > SILENCE_MAX {
@@ -151,17 +151,17 @@ mod tests {
         let start = Instant::now();
         let at = |seconds: f64| start + Duration::from_secs_f64(seconds);
         for round in 0..50 {
-            tallies.iter().for_each(|tally| tally.note(None));
+            tallies.iter().for_each(|tally| tally.note_beat());
             watchdog.round(at(0.1 * f64::from(round)));
         }
         assert_eq!(heard(&socket), vec!["WATCHDOG=1"; 5]);
         // One of the two falls silent: fed for as long as that may be an accident, then no more.
         for round in 50..120 {
-            tallies[0].note(None);
+            tallies[0].note_beat();
             watchdog.round(at(0.1 * f64::from(round)));
         }
         assert_eq!(heard(&socket).len(), 2);
-        tallies[1].note(None);
+        tallies[1].note_beat();
         watchdog.round(at(12.0));
         assert_eq!(heard(&socket), ["WATCHDOG=1"], "it lives again");
     }

@@ -4,14 +4,12 @@
 //!
 //! # Layout
 //!
-//! - [`cli`]: the command line
+//! - [`cli`]: the command line; keys, signals, and a terminal left as it was; lines where there is no terminal
 //! - [`watcher`]: the observed trains, and the state of each that is shown
-//! - [`state`]: the shown state of a train and its last minutes, without any clock or channel
-//! - [`advisor`]: advice on the next manoeuvre, now and then
+//! - [`state`]: the shown state of a train and its last minutes, without any clock or channel; advice on the next
+//!   manoeuvre
 //! - [`words`]: numbers with intervals and units, a train's lines
 //! - [`screen`]: the screen, drawn from a [`state`]
-//! - [`plain`]: lines where there is no terminal
-//! - [`terminal`]: keys, signals, and a terminal left as it was
 //!
 //! # Examples
 //!
@@ -21,11 +19,8 @@
 //! assert!(command.try_get_matches_from(["program", "--no-such-option"]).is_err());
 //! ```
 
-pub mod advisor;
 pub mod cli;
-pub mod plain;
 pub mod screen;
 pub mod state;
-pub mod terminal;
 pub mod watcher;
 pub mod words;

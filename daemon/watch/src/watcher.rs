@@ -9,8 +9,7 @@ use dynocar_shared::TrainId;
 use dynocar_transport::{Host, Role, monotonic_now_ns};
 
 use super::state::PlotHistory;
-use crate::advisor::Advisor;
-use crate::state::{Daemon, PipelineState, TrainState};
+use crate::state::{Advisor, Daemon, PipelineState, TrainState};
 
 /// Time between two searches for daemons, and between two points of the plots.
 const LOOK_EVERY: Duration = Duration::from_secs(1);

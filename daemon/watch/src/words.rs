@@ -1,6 +1,7 @@
 //! Numbers with intervals and units, and sentences on a train, for screen and lines alike.
 
 use dynocar::operator::{Suspicion, duration, force_words, refusals};
+use dynocar_shared::schema::unit_of;
 use dynocar_shared::{HALF_95, Parameter, Quantity, UseState};
 
 use crate::state::{Daemon, PipelineState, TrainState};
@@ -57,7 +58,7 @@ fn resistance_rows(pipeline: &PipelineState, shares: &[f64]) -> Vec<QuantityRow>
     let of_parameter = |parameter: Parameter| {
         let (value, std) = (snapshot.value(parameter)?, snapshot.std(parameter)?);
         let label = format!("  {}", parameter.name());
-        Some(QuantityRow { label, ..with_interval(value, std, unit(parameter)) })
+        Some(QuantityRow { label, ..with_interval(value, std, unit_of(parameter.full_name())) })
     };
     let davis = [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC];
     let (low, high) = (snapshot.speed_min_mps, snapshot.speed_max_mps);
@@ -84,23 +85,12 @@ fn main_value(quantity: Quantity, pipeline: &PipelineState) -> QuantityRow {
         Some((parameter, snapshot.value(parameter)?, snapshot.std(parameter)?))
     });
     let Some((parameter, value, std)) = found else { return QuantityRow::default() };
-    let row = with_interval(value, std, unit(parameter));
+    let row = with_interval(value, std, unit_of(parameter.full_name()));
     match parameter {
         Parameter::AdhesionLowerBound => {
             QuantityRow { number: format!("≥ {}", row.number), ..row }
         }
         _ => row,
-    }
-}
-
-/// Returns the unit of a parameter's value in a snapshot.
-fn unit(parameter: Parameter) -> &'static str {
-    match parameter {
-        Parameter::DavisA => "N/kN",
-        Parameter::DavisB => "N/kN per m/s",
-        Parameter::DavisC => "N/kN per (m/s)²",
-        Parameter::Mass => "t",
-        _ => "",
     }
 }
 

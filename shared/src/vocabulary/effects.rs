@@ -20,15 +20,25 @@ pub struct KindRow {
 
 /// Lists every kind once.
 macro_rules! effects {
-    ($( #[doc = $doc:literal] $kind:ident = $number:literal $name:literal { $($words:tt)* } )*) => {
+    ($( #[doc = $doc:literal] $kind:ident = $number:literal $name:literal {
+        title: $title:expr, seen_over: $seen_over:expr, determined_by: $determined_by:expr,
+        to_do: $to_do:expr,
+        $( separated_from $other:ident: $run:literal, )*
+    } )*) => {
         vocabulary! {
             /// An effect that a model may lack, as in the answers of `dynocar explain`.
             EffectKind: u32 { $( #[doc = $doc] $kind = $number $name ),* }
         }
 
         /// Every kind in words, in the order of its number.
-        pub const KINDS: [KindRow; EffectKind::ALL.len()] =
-            [ $( KindRow { kind: EffectKind::$kind, $($words)* } ),* ];
+        pub const KINDS: [KindRow; EffectKind::ALL.len()] = [ $( KindRow {
+            kind: EffectKind::$kind,
+            title: $title,
+            to_do: $to_do,
+            seen_over: $seen_over,
+            determined_by: $determined_by,
+            separated_from: &[ $( (EffectKind::$other, $run) ),* ],
+        } ),* ];
     };
 }
 
@@ -44,225 +54,130 @@ const HARDER: &str = "harder accelerating and braking";
 effects! {
     /// No suspicion.
     None = 0 "none" {
-        title: "nothing undeclared",
+        title: "nothing undeclared", seen_over: None, determined_by: MORE_RUNS,
         to_do: LET_EXPLAIN,
-        seen_over: None,
-        determined_by: MORE_RUNS,
-        separated_from: &[],
     }
     /// Air drag in tunnels.
     TunnelDrag = 1 "tunnel_drag" {
-        title: "tunnel drag",
+        title: "tunnel drag", seen_over: Some("chainage_m"), determined_by: "fast passes of the tunnels",
         to_do: DECLARE_IT,
-        seen_over: Some("chainage_m"),
-        determined_by: "fast passes of the tunnels",
-        separated_from: &[
-            (EffectKind::Wind, "Pass the portals in both directions and on another day."),
-            (EffectKind::LocalResistance, "Pass the place at clearly different speeds."),
-        ],
+        separated_from Wind: "Pass the portals in both directions and on another day.",
+        separated_from LocalResistance: "Pass the place at clearly different speeds.",
     }
     /// Resistance in curves.
     CurveResistance = 2 "curve_resistance" {
-        title: "curve resistance",
-        to_do: DECLARE_IT,
-        seen_over: Some("curvature_per_m"),
+        title: "curve resistance", seen_over: Some("curvature_per_m"),
         determined_by: "more passes of the sharpest curves",
-        separated_from: &[(
-            EffectKind::GradientShift,
-            "Pass the curves in both directions: a gradient changes its sign.",
-        )],
+        to_do: DECLARE_IT,
+        separated_from GradientShift: "Pass the curves in both directions: a gradient changes its sign.",
     }
     /// Wind along the line.
     Wind = 3 "wind" {
-        title: "wind along the line",
-        to_do: WEATHER,
-        seen_over: Some("direction"),
+        title: "wind along the line", seen_over: Some("direction"),
         determined_by: "fast runs in both directions on one day",
-        separated_from: &[],
+        to_do: WEATHER,
     }
     /// A brake that does not release.
     DraggingBrake = 4 "dragging_brake" {
-        title: "a dragging brake",
+        title: "a dragging brake", seen_over: Some("run"), determined_by: MORE_RUNS,
         to_do: "at the next stop check that every brake releases, and feel every vehicle's wheels for heat",
-        seen_over: Some("run"),
-        determined_by: MORE_RUNS,
-        separated_from: &[
-            (
-                EffectKind::BearingTemperature,
-                "Read the brake-cylinder pressure while released, and let the train run on.",
-            ),
-            (
-                EffectKind::LocalResistance,
-                "Pass the place in further runs: a place stays, a brake moves with its train.",
-            ),
-            (
-                EffectKind::AmbientTemperature,
-                "Read the brake-cylinder pressure while released, and record runs on a mild day.",
-            ),
-        ],
+        separated_from BearingTemperature: "Read the brake-cylinder pressure while released, and let the train run on.",
+        separated_from LocalResistance: "Pass the place in further runs: a place stays, a brake moves with its train.",
+        separated_from AmbientTemperature: "Read the brake-cylinder pressure while released, and record runs on a \
+             mild day.",
     }
     /// A wrong wheel diameter, hence a wrong speed scale.
     WheelDiameter = 5 "wheel_diameter" {
-        title: "a wrong wheel diameter",
-        to_do: "measure the wheels, and set the diameter measured in the speed sensor",
-        seen_over: Some("speed_mps"),
+        title: "a wrong wheel diameter", seen_over: Some("speed_mps"),
         determined_by: "positions over several kilometres",
-        separated_from: &[],
+        to_do: "measure the wheels, and set the diameter measured in the speed sensor",
     }
     /// A gradient profile moved along the line.
     GradientShift = 6 "gradient_shift" {
-        title: "a gradient profile shifted along the line",
-        to_do: CHECK_PROFILE,
-        seen_over: Some("chainage_m"),
+        title: "a gradient profile shifted along the line", seen_over: Some("chainage_m"),
         determined_by: "more passes of the steepest changes of gradient",
-        separated_from: &[],
+        to_do: CHECK_PROFILE,
     }
     /// Another mass than declared.
     MassChange = 7 "mass_change" {
-        title: "a changed mass",
+        title: "a changed mass", seen_over: Some("acceleration_mps2"), determined_by: HARDER,
         to_do: "check the declared mass against the load",
-        seen_over: Some("acceleration_mps2"),
-        determined_by: HARDER,
-        separated_from: &[
-            (
-                EffectKind::TractionGain,
-                "Coast down a known gradient: a mass is felt there, a gain is not.",
-            ),
-            (
-                EffectKind::RotatingMass,
-                "Pass a steep gradient at other loads: the rotating mass does not feel it.",
-            ),
-        ],
+        separated_from TractionGain: "Coast down a known gradient: a mass is felt there, a gain is not.",
+        separated_from RotatingMass: "Pass a steep gradient at other loads: the rotating mass does not feel it.",
     }
     /// A reported force that is not the true one.
     TractionGain = 8 "traction_gain" {
-        title: "a wrong scale of the reported traction force",
-        to_do: "check the scale of the reported forces",
-        seen_over: Some("traction_force_n"),
+        title: "a wrong scale of the reported traction force", seen_over: Some("traction_force_n"),
         determined_by: HARDER,
-        separated_from: &[(
-            EffectKind::BrakeGain,
-            "Pull hard without braking, and brake hard without pulling.",
-        )],
+        to_do: "check the scale of the reported forces",
+        separated_from BrakeGain: "Pull hard without braking, and brake hard without pulling.",
     }
     /// Forces that act later than reported.
     ActuatorDelay = 9 "actuator_delay" {
-        title: "delayed forces",
+        title: "delayed forces", seen_over: Some("force_change_n_per_s"), determined_by: MORE_RUNS,
         to_do: "check how late forces act after they are reported",
-        seen_over: Some("force_change_n_per_s"),
-        determined_by: MORE_RUNS,
-        separated_from: &[(
-            EffectKind::SpeedDelay,
-            "Record a position of its own (GNSS, balises) on steep and changing gradients: the line acts at \
-             once on a train, a late speed shows it late.",
-        )],
+        separated_from SpeedDelay: "Record a position of its own (GNSS, balises) on steep and changing gradients: the \
+             line acts at once on a train, a late speed shows it late.",
     }
     /// Another rotating mass than declared.
     RotatingMass = 10 "rotating_mass" {
-        title: "another rotating mass than declared",
+        title: "another rotating mass than declared", seen_over: Some("acceleration_mps2"), determined_by: HARDER,
         to_do: "check the declared rotating mass",
-        seen_over: Some("acceleration_mps2"),
-        determined_by: HARDER,
-        separated_from: &[
-            (
-                EffectKind::TractionGain,
-                "Compare accelerating with braking: a gain acts on traction only.",
-            ),
-            (
-                EffectKind::WheelDiameter,
-                "Compare the odometer with balises over several kilometres.",
-            ),
-        ],
+        separated_from TractionGain: "Compare accelerating with braking: a gain acts on traction only.",
+        separated_from WheelDiameter: "Compare the odometer with balises over several kilometres.",
     }
     /// Cold bearings that warm up.
     BearingTemperature = 11 "bearing_temperature" {
-        title: "cold bearings that warm up",
+        title: "cold bearings that warm up", seen_over: Some("time_since_start_s"), determined_by: MORE_RUNS,
         to_do: WEATHER,
-        seen_over: Some("time_since_start_s"),
-        determined_by: MORE_RUNS,
-        separated_from: &[],
     }
     /// Resistance that follows the outside temperature.
     AmbientTemperature = 12 "ambient_temperature" {
-        title: "resistance that follows the outside temperature",
-        to_do: WEATHER,
-        seen_over: Some("ambient_temperature_degc"),
+        title: "resistance that follows the outside temperature", seen_over: Some("ambient_temperature_degc"),
         determined_by: "runs on colder and warmer days",
-        separated_from: &[(
-            EffectKind::BearingTemperature,
-            "Start warm on a cold day and cold on a warm one.",
-        )],
+        to_do: WEATHER,
+        separated_from BearingTemperature: "Start warm on a cold day and cold on a warm one.",
     }
     /// Extra resistance at a place.
     LocalResistance = 13 "local_resistance" {
-        title: "a local resistance",
+        title: "a local resistance", seen_over: Some("chainage_m"), determined_by: MORE_RUNS,
         to_do: "have the track and the overhead line looked at there; change nothing on the train",
-        seen_over: Some("chainage_m"),
-        determined_by: MORE_RUNS,
-        separated_from: &[],
     }
     /// A brake force that the rail does not carry.
     LowAdhesion = 14 "low_adhesion" {
-        title: "low adhesion",
+        title: "low adhesion", seen_over: Some("traction_force_n"), determined_by: MORE_RUNS,
         to_do: "expect long braking distances: the rail carries less than the brake asks",
-        seen_over: Some("traction_force_n"),
-        determined_by: MORE_RUNS,
-        separated_from: &[],
     }
     /// A real residual that no known effect explains.
     Unknown = 15 "unknown" {
-        title: "something outside the library",
+        title: "something outside the library", seen_over: None, determined_by: MORE_RUNS,
         to_do: LET_EXPLAIN,
-        seen_over: None,
-        determined_by: MORE_RUNS,
-        separated_from: &[],
     }
     /// A declared gradient that is wrong by a smooth function of the chainage.
     GradientError = 16 "gradient_error" {
-        title: "a gradient that is wrong along the line",
+        title: "a gradient that is wrong along the line", seen_over: Some("chainage_m"), determined_by: MORE_RUNS,
         to_do: CHECK_PROFILE,
-        seen_over: Some("chainage_m"),
-        determined_by: MORE_RUNS,
-        separated_from: &[(
-            EffectKind::LocalResistance,
-            "Drive the line in the other direction: a gradient changes its sign there.",
-        )],
+        separated_from LocalResistance: "Drive the line in the other direction: a gradient changes its sign there.",
     }
     /// A measured speed that is late.
     SpeedDelay = 17 "speed_delay" {
-        title: "a measured speed that is late",
+        title: "a measured speed that is late", seen_over: Some("acceleration_mps2"), determined_by: MORE_RUNS,
         to_do: "check how old a speed is when the controller reads it",
-        seen_over: Some("acceleration_mps2"),
-        determined_by: MORE_RUNS,
-        separated_from: &[],
     }
     /// A brake that is weaker or stronger than reported.
     BrakeGain = 18 "brake_gain" {
-        title: "a brake that is weaker or stronger than reported",
-        to_do: "check what the brake exerts against what it reports: friction, pressure, brakes cut out",
-        seen_over: Some("brake_force_n"),
+        title: "a brake that is weaker or stronger than reported", seen_over: Some("brake_force_n"),
         determined_by: "harder braking on the level",
-        separated_from: &[
-            (
-                EffectKind::MassChange,
-                "Pull hard at the same load: a mass is felt there, a brake is not.",
-            ),
-            (
-                EffectKind::LowAdhesion,
-                "Brake gently and hard on a dry day: the rail limits hard braking only.",
-            ),
-        ],
+        to_do: "check what the brake exerts against what it reports: friction, pressure, brakes cut out",
+        separated_from MassChange: "Pull hard at the same load: a mass is felt there, a brake is not.",
+        separated_from LowAdhesion: "Brake gently and hard on a dry day: the rail limits hard braking only.",
     }
     /// A brake that acts later than reported, while traction does not.
     BrakeDelay = 19 "brake_delay" {
-        title: "a brake that acts late",
-        to_do: "check how long the brake takes to build up and to release after it is reported",
-        seen_over: Some("force_change_n_per_s"),
+        title: "a brake that acts late", seen_over: Some("force_change_n_per_s"),
         determined_by: "more brakings that begin and end at speed",
-        separated_from: &[(
-            EffectKind::ActuatorDelay,
-            "Change traction quickly without braking: only where it is late too are both.",
-        )],
+        to_do: "check how long the brake takes to build up and to release after it is reported",
+        separated_from ActuatorDelay: "Change traction quickly without braking: only where it is late too are both.",
     }
 }
 

@@ -15,8 +15,8 @@ use rustix::io::Errno;
 use rustix::process::{Resource, getrlimit};
 use rustix::time::{ClockId, clock_gettime};
 
+use crate::announcement::{DirectoryIdentity, SHARED_MEMORY};
 use crate::error::ChannelError;
-use crate::identity::{DirectoryIdentity, SHARED_MEMORY};
 
 /// Longest root directory in bytes: the system's limit of a path, less the names of files in it.
 const ROOT_BYTES_MAX: usize = 4000;

@@ -10,7 +10,6 @@ mod announcement;
 pub mod channel;
 pub mod error;
 pub mod host;
-mod identity;
 pub mod peer;
 
 pub use announcement::{Announcement, Role};

@@ -12,11 +12,10 @@ use std::time::Duration;
 
 use dynocar_shared::{ParameterSnapshot, TrainId};
 
-use crate::announcement::{Announcement, Role};
+use crate::announcement::{Announcement, Role, identity, identity_of};
 use crate::channel::process::LockedFile;
 use crate::error::ChannelError;
 use crate::host::{Host, open_private, unusable};
-use crate::identity::{identity, identity_of};
 
 /// State of the other side, as far as it is known.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! Cramér–Rao bounds of the scenario, from the sensitivities of the true motion.
 
 use dynocar_core::filter::Gaussian;
-use dynocar_estimators::wang::line_resistance::SpeedBasis;
+use dynocar_estimators::wang::force_model::SpeedBasis;
 use dynocar_model::train::Davis;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use nalgebra::{Matrix3, Matrix4, SMatrix, SVector, Vector4};

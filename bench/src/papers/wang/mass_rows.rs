@@ -2,7 +2,7 @@
 
 use dynocar_core::pipeline::{Estimator, Outcome};
 use dynocar_estimators::wang::MassRegression;
-use dynocar_estimators::wang::line_resistance::LineResistance;
+use dynocar_estimators::wang::force_model::LineResistance;
 use dynocar_model::force::ResolvedSample;
 
 use super::bound::{FisherInformation, mass_std_in_wind};

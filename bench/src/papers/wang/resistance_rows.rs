@@ -2,8 +2,8 @@
 //! features, one step a sample, learning rate 1e-7).
 
 use dynocar_core::pipeline::Estimator;
+use dynocar_estimators::wang::force_model::LineResistance;
 use dynocar_estimators::wang::known_motion::{KnownMotion, LearningSet};
-use dynocar_estimators::wang::line_resistance::LineResistance;
 use dynocar_estimators::wang::{
     JointLeastSquares, JointLeastSquaresSettings, StagedDescent, StagedDescentSettings,
 };

@@ -3,7 +3,7 @@
 
 use dynocar_core::pipeline::Outcome;
 use dynocar_core::pipeline::admission::Admission;
-use dynocar_estimators::wang::line_resistance::LineResistance;
+use dynocar_estimators::wang::force_model::LineResistance;
 use dynocar_estimators::wang::{
     MassKalman, MassKalmanSettings, MassRegression, StagedDescent, StagedDescentSettings,
 };

@@ -8,7 +8,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::NotPositiveDefinite;
-use super::rank_one::{measured, moved};
+use super::covariance::{measured, moved};
 
 /// Innovation of a scalar measurement before the measurement update.
 #[derive(Clone, Copy, Debug, PartialEq)]

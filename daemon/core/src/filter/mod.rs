@@ -4,12 +4,11 @@
 //! batch least-squares twin.
 //!
 //! - [`gaussian`]: a belief in covariance form, measured by Joseph's form where subtraction would
-//!   cost digits; `rank_one` is its arithmetic
-//! - [`square_root`]: a belief whose covariance is stored as a triangular factor
-//! - `information`, [`triangular`]: a belief in square-root information form; [`drifting_level`] is
-//!   one with a level that may drift
-//! - `rls`, `mils`, `bounded`: least squares, recursive, with bounds
-//! - `whitening`, `straight_line`, `median`: from raw rows to independent, clean ones
+//!   cost digits; [`covariance`] is its arithmetic, and a covariance that is stored as a triangular factor
+//! - `rows`, [`triangular`]: raw rows made independent, and a belief in square-root information form;
+//!   [`drifting_level`] is one with a level that may drift
+//! - `least_squares`, `mils`: least squares, recursive, with bounds
+//! - `statistics`: the median of the newest values, and a straight line through points
 //! - [`levenberg_marquardt`]: small nonlinear least squares in a box
 //! - [`fixed_lag`]: estimates of an earlier state by later measurements, either without a backward pass or by one that
 //!   inverts no covariance (Bryson and Frazier)
@@ -18,36 +17,29 @@
 //! - [`lanes`]: sums and powers over slices
 
 pub mod bank;
-mod bounded;
+pub mod covariance;
 pub mod drifting_level;
 pub mod fixed_lag;
 pub mod gaussian;
-mod information;
 pub mod lanes;
+mod least_squares;
 pub mod levenberg_marquardt;
-mod median;
 mod mils;
 pub mod particle;
 pub mod random;
-mod rank_one;
-mod rls;
-pub mod square_root;
-mod straight_line;
+mod rows;
+mod statistics;
 #[cfg(test)]
 mod test_runs;
 pub mod triangular;
-mod whitening;
 
 pub use bank::Bank;
-pub use bounded::{Bounded, bounded_minimum};
 pub use drifting_level::DriftingLevel;
 pub use gaussian::{Gaussian, Innovation};
-pub use information::SquareRootInformation;
-pub use median::RunningMedian;
+pub use least_squares::{Bounded, Rls, bounded_minimum};
 pub use mils::{Mils, Penalty};
-pub use rls::Rls;
-pub use straight_line::FittedLine;
-pub use whitening::{Propagation, Sighting, UnitRow, Whitener};
+pub use rows::{Propagation, Sighting, SquareRootInformation, UnitRow, Whitener};
+pub use statistics::{FittedLine, RunningMedian};
 
 /// A belief or a measurement is not sound: a matrix that should be positive definite is not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

@@ -12,7 +12,6 @@ pub mod momentum;
 pub mod monitor;
 pub mod motion;
 pub mod output;
-pub mod quantities;
 pub mod settings;
 pub mod train_kalman;
 mod usable;
@@ -61,7 +60,7 @@ impl Pipeline {
         snapshot.pipeline_kind = estimator.kind() as u32;
         let admission = Admission::new(train_id, Arc::clone(&train));
         admission.write(&*estimator, &mut snapshot);
-        let answerable = quantities::answerable(estimator.kind());
+        let answerable = output::answerable(estimator.kind());
         Pipeline {
             admission,
             resolver: ForceResolver::new(train, track),

@@ -71,18 +71,12 @@ impl InputFault {
 
     /// Returns why a pipeline that is fed with it is not to be trusted.
     pub const fn reason(self) -> Reason {
-        match self {
-            InputFault::TimeScale
-            | InputFault::SpeedScale
-            | InputFault::PositionScale
-            | InputFault::DirectionReversed => Reason::ImplausibleMotion,
-            InputFault::MassScale => Reason::ImplausibleMass,
-            InputFault::ForcesSwapped
-            | InputFault::ForcesScale
-            | InputFault::TractionScale
-            | InputFault::BrakeScale => Reason::ImplausibleForces,
-            InputFault::GradientSign | InputFault::GradientScale => Reason::ImplausibleGradient,
-            InputFault::PressureScale => Reason::ImplausiblePressure,
+        match self.dimension() {
+            Dimension::Mass => Reason::ImplausibleMass,
+            Dimension::Force => Reason::ImplausibleForces,
+            Dimension::Ratio => Reason::ImplausibleGradient,
+            Dimension::Pressure => Reason::ImplausiblePressure,
+            _ => Reason::ImplausibleMotion,
         }
     }
 
@@ -107,17 +101,15 @@ impl InputFault {
 
     /// Returns the dimension of the quantity's units.
     pub const fn dimension(self) -> Dimension {
+        use InputFault::*;
         match self {
-            InputFault::TimeScale => Dimension::Time,
-            InputFault::SpeedScale => Dimension::Speed,
-            InputFault::PositionScale | InputFault::DirectionReversed => Dimension::Length,
-            InputFault::MassScale => Dimension::Mass,
-            InputFault::ForcesSwapped
-            | InputFault::ForcesScale
-            | InputFault::TractionScale
-            | InputFault::BrakeScale => Dimension::Force,
-            InputFault::GradientSign | InputFault::GradientScale => Dimension::Ratio,
-            InputFault::PressureScale => Dimension::Pressure,
+            TimeScale => Dimension::Time,
+            SpeedScale => Dimension::Speed,
+            PositionScale | DirectionReversed => Dimension::Length,
+            MassScale => Dimension::Mass,
+            ForcesSwapped | ForcesScale | TractionScale | BrakeScale => Dimension::Force,
+            GradientSign | GradientScale => Dimension::Ratio,
+            PressureScale => Dimension::Pressure,
         }
     }
 
@@ -217,11 +209,9 @@ impl DetectedFault {
 impl fmt::Display for DetectedFault {
     /// In words, for a quantity read in the unit that samples hold.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let base = match self.fault.dimension() {
-            Dimension::Ratio => Unit::find(Dimension::Ratio, "permille"),
-            dimension => Some(Unit::base_of(dimension)),
-        };
-        f.write_str(&self.words(&base.unwrap_or_else(|| Unit::base_of(self.fault.dimension()))))
+        let dimension = self.fault.dimension();
+        let permille = Unit::find(dimension, "permille");
+        f.write_str(&self.words(&permille.unwrap_or_else(|| Unit::base_of(dimension))))
     }
 }
 

@@ -5,13 +5,236 @@
 //! # Layout, in the order of the work
 //!
 //! - `watch`: sample by sample, with [`window_balance`] (forces against acceleration)
-//! - [`diagnosis`]: which input fault makes all figures come out as they did
+//! - [`DetectedFaults`]: which input fault makes all figures come out as they did
 //! - [`input_fault`]: the input faults, their names, severity and words
+//!
+//! # Diagnosis of an input fault: the fault that explains all figures
+//!
+//! | fault by a factor f of reported over true | forces' factor | distance by position / by speed | gradient's factor |
+//! | --- | --- | --- | --- |
+//! | forces | 1/f | 1 | 1 |
+//! | mass | f | 1 | 1 |
+//! | speed | f | 1/f | f |
+//! | time | 1/f | 1/f | 1/f |
+//! | position | 1 | f | not known |
+//! | traction and brake exchanged | -1 | 1 | 1 |
 
-pub mod diagnosis;
 pub mod input_fault;
 pub(crate) mod watch;
 pub mod window_balance;
 
-pub use diagnosis::DetectedFaults;
 pub use input_fault::{DetectedFault, InputFault, Severity};
+
+use arrayvec::ArrayVec;
+use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+
+use crate::pipeline::admission::limits::MASS;
+use watch::Figures;
+use window_balance::{FittedFactor, WindowBalance};
+
+/// Factors of forces within these bounds are effects that a train can have.
+const FORCE_FACTORS: (f64, f64) = (0.4, 2.5);
+/// Distance by position over distance by speed within these bounds is wear, gaps and drift.
+const DISTANCE_RATIOS: (f64, f64) = (0.8, 1.25);
+/// Factors of traction and brake that differ by less are one factor.
+const SAME_FACTOR: f64 = 1.6;
+/// Steps in s outside these bounds are unusual for a recorder of a train.
+const USUAL_STEP_S: (f64, f64) = (0.002, 20.0);
+/// Greatest share of the effort curve that a train may use, and the least that is worth a remark.
+const EFFORT_SHARES: (f64, f64) = (0.02, 4.0);
+/// Gradients in ‰ (root mean square) below and beyond which a wrong unit is credible.
+const GRADIENT_RMS_PERMILLE: (f64, f64) = (3.0, 25.0);
+/// Factors of the gradient within these bounds are effects that a train and its line can have: those of simulated runs
+/// with every effect, large, lie between 0.8 and 1.3, and the gradient of a wrong place looks too large.
+const GRADIENT_FACTORS: (f64, f64) = (1.0 / 1.5, 1.4);
+/// Windows of a recorded run, and standard deviations from 0, that are enough to judge its gradients by the whole run.
+const ALL_WINDOWS_MIN: f64 = 60.0;
+const ALL_DEVIATIONS_MIN: f64 = 20.0;
+/// Gradients at a wrong place or with noise look too large, too, but leave all of the scatter of the true gradients
+/// that they do not explain; a wrong unit leaves less than this share of it.
+const SCATTER_SHARE_MAX: f64 = 0.4;
+/// The least mean pressure in Pa of applied brakes; a pressure that is too high is out of range.
+const BRAKING_PRESSURE_MIN_PA: f64 = 5e3;
+/// An ordinary mean pressure in Pa of applied brakes.
+const ORDINARY_PRESSURE_PA: f64 = 1e5;
+
+/// Detected faults at most.
+const DETECTED_MAX: usize = 4;
+
+fn add(found: &mut DetectedFaults, fault: InputFault, factor: f64) {
+    // Of more than there is room for, the first are the most fundamental.
+    let _ = found.try_push(DetectedFault { fault, factor });
+}
+
+/// Certain faults of the input, the most fundamental first.
+pub type DetectedFaults = ArrayVec<DetectedFault, DETECTED_MAX>;
+
+/// Judges figures.
+///
+/// # Real-time
+///
+/// Bounded work, no allocation.
+pub fn diagnose(figures: &Figures) -> DetectedFaults {
+    let mut found = DetectedFaults::default();
+    let kinematic = kinematic(figures);
+    let (forces_by, gradients_by) = match kinematic {
+        Some(DetectedFault { fault: InputFault::SpeedScale, factor }) => (factor, factor),
+        Some(DetectedFault { fault: InputFault::TimeScale, factor }) => {
+            (1.0 / factor, 1.0 / factor)
+        }
+        _ => (1.0, 1.0),
+    };
+    if let Some(DetectedFault { fault, factor }) = kinematic {
+        add(&mut found, fault, factor);
+    }
+    let mut forces_by = forces_by;
+    if let Some(ratio) = figures.mass_ratio.filter(|&ratio| MASS.is_passed(ratio, 1.0)) {
+        add(&mut found, InputFault::MassScale, ratio);
+        forces_by *= ratio;
+    }
+    of_forces(figures, forces_by, kinematic.is_some(), &mut found);
+    if kinematic.is_none() {
+        of_gradient(figures, gradients_by, &mut found);
+    }
+    if let Some(pressure_pa) = figures.braking_pressure_pa
+        && pressure_pa < BRAKING_PRESSURE_MIN_PA
+    {
+        add(&mut found, InputFault::PressureScale, pressure_factor(pressure_pa));
+    }
+    found
+}
+
+fn is_outside(value: f64, (low, high): (f64, f64)) -> bool {
+    !(low..=high).contains(&value)
+}
+
+/// Returns the input fault that explains how position and speed go together.
+fn kinematic(figures: &Figures) -> Option<DetectedFault> {
+    let ratio = figures.distance_ratio?;
+    if (-DISTANCE_RATIOS.1..-DISTANCE_RATIOS.0).contains(&ratio) {
+        return Some(DetectedFault { fault: InputFault::DirectionReversed, factor: ratio });
+    }
+    if !(ratio > 0.0) || !is_outside(ratio, DISTANCE_RATIOS) {
+        return None;
+    }
+    let candidates = [
+        (InputFault::SpeedScale, 1.0 / ratio, 1.0 / ratio),
+        (InputFault::TimeScale, 1.0 / ratio, ratio),
+        (InputFault::PositionScale, ratio, 1.0),
+    ];
+    let of_forces = common_factor(figures);
+    let has_usual_step = !is_outside(figures.step_s, USUAL_STEP_S);
+    let is_unlikely = |fault| match fault {
+        InputFault::TimeScale => has_usual_step,
+        InputFault::PositionScale => !has_usual_step,
+        _ => false,
+    };
+    let misfit = |fault: InputFault, factor: f64, expected: f64| {
+        let of_unit = fault.misfit(factor)?;
+        Some(match of_forces {
+            Some(of_forces) if of_forces > 0.0 => of_unit + (of_forces / expected).ln().abs(),
+            // The forces do not show it: a time in another unit shows in the steps.
+            _ => of_unit + if is_unlikely(fault) { 1.0 } else { 0.0 },
+        })
+    };
+    let known = candidates.into_iter().filter_map(|(fault, factor, expected)| {
+        Some((misfit(fault, factor, expected)?, DetectedFault { fault, factor }))
+    });
+    known.min_by(|one, other| one.0.total_cmp(&other.0)).map(|(_, fault)| fault)
+}
+
+/// Returns the factor of both forces, when they have one.
+fn common_factor(figures: &Figures) -> Option<f64> {
+    match (figures.slopes.traction, figures.slopes.brake) {
+        (Some(one), Some(other)) => {
+            let ratio = one / other;
+            (1.0 / SAME_FACTOR..SAME_FACTOR).contains(&ratio).then(|| {
+                // The geometric mean, with their sign.
+                one.signum() * (one * other).sqrt()
+            })
+        }
+        (one, other) => one.or(other),
+    }
+}
+
+fn of_forces(figures: &Figures, by: f64, is_kinematic: bool, found: &mut DetectedFaults) {
+    let slopes = figures.slopes;
+    if let Some(common) = common_factor(figures).map(|factor| factor / by) {
+        if common < -FORCE_FACTORS.0 {
+            add(found, InputFault::ForcesSwapped, common);
+        } else if is_outside(common, FORCE_FACTORS) {
+            let (fault, factor) = blamed(figures, common, is_kinematic);
+            add(found, fault, factor);
+        }
+        return;
+    }
+    let of_one =
+        [(InputFault::TractionScale, slopes.traction), (InputFault::BrakeScale, slopes.brake)];
+    for (fault, slope) in of_one {
+        let Some(factor) = slope else { continue };
+        let factor = factor / by;
+        if is_outside(factor, FORCE_FACTORS) {
+            add(found, fault, 1.0 / factor);
+        }
+    }
+}
+
+/// Returns who is to blame when both forces miss the acceleration by a factor: the speed where its units
+/// explain it and no position contradicts, the mass where the forces are such as the effort curves
+/// allow and would not be otherwise, else the forces.
+fn blamed(figures: &Figures, common: f64, is_kinematic: bool) -> (InputFault, f64) {
+    let of_forces = InputFault::ForcesScale.misfit(common).unwrap_or(f64::INFINITY);
+    let of_speed = InputFault::SpeedScale.misfit(common).filter(|_| !is_kinematic);
+    if of_speed.is_some_and(|misfit| misfit < of_forces) {
+        return (InputFault::SpeedScale, common);
+    }
+    let shares = figures.effort_shares.iter().flatten().copied();
+    let is_mass = shares.reduce(f64::max).is_some_and(|share| {
+        !is_outside(share, EFFORT_SHARES) && is_outside(share * common, EFFORT_SHARES)
+    });
+    if is_mass { (InputFault::MassScale, common) } else { (InputFault::ForcesScale, 1.0 / common) }
+}
+
+fn of_gradient(figures: &Figures, by: f64, found: &mut DetectedFaults) {
+    let Some(slope) = figures.slopes.gradient else { return };
+    let factor = slope / by;
+    if factor < 0.0 {
+        if !is_outside(-factor, DISTANCE_RATIOS) {
+            add(found, InputFault::GradientSign, factor);
+        }
+        return;
+    }
+    let rms = figures.gradient_rms_permille;
+    let is_credible =
+        if factor > 1.0 { rms < GRADIENT_RMS_PERMILLE.0 } else { rms > GRADIENT_RMS_PERMILLE.1 };
+    let is_beyond_effects = is_outside(factor, FORCE_FACTORS);
+    if is_credible && is_beyond_effects && InputFault::GradientScale.misfit(1.0 / factor).is_some()
+    {
+        add(found, InputFault::GradientScale, 1.0 / factor);
+    }
+}
+
+/// Judges the gradients of a recorded run by all of it, which shows smaller factors than a few windows do: degrees
+/// that were read as per cent.
+pub fn gradient_fault(all: &WindowBalance) -> Option<DetectedFault> {
+    let [.., gradient] = all.fit()?;
+    let FittedFactor { factor, scatter_mps2, .. } = gradient;
+    let is_known = all.windows() >= ALL_WINDOWS_MIN && gradient.is_known(ALL_DEVIATIONS_MIN);
+    if !is_known || factor < 0.0 || !is_outside(factor, GRADIENT_FACTORS) {
+        return None;
+    }
+    let of_gradients_mps2 = 1e-3 * STANDARD_GRAVITY_MPS2 * all.gradient_rms_permille();
+    let left_mps2 = of_gradients_mps2 * (1.0 - factor * factor).max(0.0).sqrt();
+    let is_scale = factor > 1.0 || scatter_mps2 < SCATTER_SHARE_MAX * left_mps2;
+    is_scale.then_some(DetectedFault { fault: InputFault::GradientScale, factor: 1.0 / factor })
+}
+
+/// Returns the factor of units that brings a pressure next to an ordinary one.
+fn pressure_factor(pressure_pa: f64) -> f64 {
+    let distance = |factor: &f64| (pressure_pa / factor / ORDINARY_PRESSURE_PA).ln().abs();
+    let factors = [1e-5, 1e-3, 1e-2];
+    factors
+        .into_iter()
+        .min_by(|one, other| distance(one).total_cmp(&distance(other)))
+        .unwrap_or(1.0)
+}

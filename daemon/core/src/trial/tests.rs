@@ -7,8 +7,7 @@ use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
 use super::evidence::RivalEvidence;
-use super::ledger::{Ledger, OpenLoop};
-use super::{ModelTrials, Rival};
+use super::{Ledger, ModelTrials, OpenLoop, Rival};
 
 const TRAIN: TrainId = TrainId(1);
 const MASS_KG: f64 = 100e3;

@@ -16,7 +16,7 @@ use super::regression::{
     AffineMotion, RegressionObservation, RegressionSolution, Unknowns, WhiteRow,
 };
 use super::report::{DrivenSpeeds, ResistanceReport, SolutionEvidence};
-use crate::liu::solver::{Solver, bank_penalty};
+use crate::liu::{Solver, bank_penalty};
 
 /// Rows that the innovation statistics look back over.
 const MONITOR_ROWS: u32 = 60;

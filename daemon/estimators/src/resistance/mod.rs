@@ -4,8 +4,8 @@
 //!
 //! - [`dynocar_core::pipeline::momentum`]: samples to blocks of momentum; `regression`: blocks, and coasting
 //!   segments, as observations
-//! - `noise_model`, `noise_bank`: observations to independent rows, and how noisy they are
-//! - `solver` and `coasting` of `crate::liu`: the paper's recursions and data
+//! - `noise_bank`: observations to independent rows, and how noisy they are
+//! - `crate::liu`: the paper's recursions and data
 //! - `report`: bounds, excitation, status
 //! - `least_squares`: the pipeline around these parts
 //! - `kalman`: the robust filter over every sample, with a least-squares pipeline in parallel
@@ -30,7 +30,7 @@ use dynocar_model::train::TrainModel;
 use dynocar_shared::PipelineKind;
 
 use self::settings::{KalmanSettings, LsSettings, MilsSettings, RlsSettings};
-use crate::liu::solver::Solver;
+use crate::liu::Solver;
 
 /// Regularised least squares over all rows (Liu 2018, eq. 7).
 ///

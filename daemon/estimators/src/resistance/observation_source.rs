@@ -7,7 +7,7 @@ use dynocar_model::train::Davis;
 use dynocar_shared::RejectionReason;
 
 use super::regression::RegressionObservation;
-use crate::liu::coasting::CoastingSegments;
+use crate::liu::CoastingSegments;
 
 #[derive(Clone, Debug)]
 enum Builder {

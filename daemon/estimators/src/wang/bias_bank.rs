@@ -9,9 +9,8 @@ use dynocar_core::filter::{Gaussian, NotPositiveDefinite};
 use dynocar_core::pipeline::motion::{OutlierRow, Trust};
 use nalgebra::{Matrix2, Vector2, Vector3};
 
-use super::bias_model::{BiasModel, MapError};
+use super::force_model::{BiasModel, LineResistance, MapError};
 use super::known_motion::{Inertia, KnownMotion};
-use super::line_resistance::LineResistance;
 
 /// Index of the speed in m/s in a filter's state.
 pub const SPEED: usize = 0;

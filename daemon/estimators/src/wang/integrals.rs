@@ -18,9 +18,8 @@ use dynocar_core::filter::drifting_level::{DriftStep, LEVEL, PARAMETERS};
 use dynocar_model::train::TrainModel;
 use nalgebra::SVector;
 
-use super::bias_model::{BiasModel, MapError};
+use super::force_model::{BiasModel, MapError, SpeedBasis};
 use super::known_motion::{Inertia, KnownMotion};
-use super::line_resistance::SpeedBasis;
 
 /// Resistance in N/kN that a curve or a tunnel typically adds.
 const TYPICAL_N_PER_KN: f64 = 5.0;

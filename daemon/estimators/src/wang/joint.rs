@@ -16,13 +16,12 @@ use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, RejectionReason};
 use nalgebra::{Matrix3, SMatrix};
 
-use super::bias_model::{BiasModel, MapError};
+use super::force_model::{BiasModel, DEFAULT_REFERENCE_RADIUS_M, LineResistance, MapError};
 use super::integrals::{
     BiasHypothesis, INVERSE_MASS, IntegralStep, Integrals, POLYNOMIALS, RegressorRow, Regressors,
     UNKNOWNS,
 };
 use super::known_motion::{KnownMotion, LearningSet};
-use super::line_resistance::{DEFAULT_REFERENCE_RADIUS_M, LineResistance};
 
 /// Updates between two calculations of the slope of the resistance.
 const REFRESH_EVERY: u32 = 50;

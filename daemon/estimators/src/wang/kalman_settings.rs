@@ -6,8 +6,7 @@ use dynocar_core::settings;
 use dynocar_model::train::{Davis, TrainModel};
 
 use super::bias_bank::MODELS;
-use super::bias_model::BiasModel;
-use super::line_resistance::{DEFAULT_REFERENCE_RADIUS_M, LineResistance};
+use super::force_model::{BiasModel, DEFAULT_REFERENCE_RADIUS_M, LineResistance};
 
 settings! {
     /// Settings of [`super::MassKalman`].

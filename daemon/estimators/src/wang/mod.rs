@@ -5,18 +5,17 @@
 //! - `descent`, `staged`: the paper's stages, by normalised gradient descent on sums over all samples
 //! - [`JointLeastSquares`]: resistances and mass together, on [`integrals`] of motion
 //! - [`MassKalman`]: the mass by Kalman filters [v, 1/m, bias], a [`bias_bank`] of them
-//! - [`known_motion`], [`line_resistance`], [`bias_model`]: the values taken from a sample, and the parts of the model
+//! - [`known_motion`], [`force_model`]: the values taken from a sample, and the parts of the model
 
 pub mod bias_bank;
-pub mod bias_model;
 mod descent;
+pub mod force_model;
 pub mod integrals;
 mod joint;
 mod joint_snapshot;
 mod kalman;
 mod kalman_settings;
 pub mod known_motion;
-pub mod line_resistance;
 mod staged;
 
 pub use joint::{JointLeastSquares, JointLeastSquaresSettings};

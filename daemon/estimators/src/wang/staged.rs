@@ -16,8 +16,8 @@ use nalgebra::{Matrix4, SVector, Vector4};
 use serde::Deserialize;
 
 use super::descent::MeanSquare;
+use super::force_model::{DEFAULT_REFERENCE_RADIUS_M, LineResistance, SpeedBasis};
 use super::known_motion::{Inertia, KnownMotion, LearningSet};
-use super::line_resistance::{DEFAULT_REFERENCE_RADIUS_M, LineResistance, SpeedBasis};
 
 /// Number of used samples below which no estimate is reported.
 const SAMPLES_MIN: f64 = 50.0;

@@ -17,7 +17,7 @@ use dynocar_core::filter::random::split_mix;
 use dynocar_model::train::Davis;
 use nalgebra::Vector3;
 
-use super::deviation::{Deviation, deviation};
+use super::window::{Deviation, deviation};
 use crate::xia::trajectory::step::TrajectoryStep;
 
 /// When Algorithm 1 draws new parameters at random.

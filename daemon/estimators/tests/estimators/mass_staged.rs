@@ -6,7 +6,7 @@ use crate::mass_common::{
     Admitted, LEG, Simulation, assert_finite, feed, garbage, snapshot, train,
 };
 use dynocar_estimators::EstimatorSettings;
-use dynocar_estimators::wang::line_resistance::LineResistance;
+use dynocar_estimators::wang::force_model::LineResistance;
 use dynocar_estimators::wang::{MassRegression, StagedDescent, StagedDescentSettings};
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{Davis, TrainModel};

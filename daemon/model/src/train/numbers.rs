@@ -1,8 +1,7 @@
 //! Numbers of `train.toml`: one row declares a member of the train, its value where nothing is declared, and the key
 //! by which every reader and writer of the file knows it.
 
-use super::EffortCurve;
-use super::rule::NumberRule;
+use super::{EffortCurve, NumberRule};
 use crate::terms::extra::ExtraResistance;
 
 /// One number of a train, as `train.toml` declares it.

@@ -6,8 +6,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use dynocar::models::moment::UtcSecond;
-use dynocar::stamp::{SinceBoot, Stamp};
+use dynocar::stamp::{SinceBoot, Stamp, UtcSecond};
 use dynocar::storage::{Rights, SharedStorage, StorageError, replace};
 use serde::{Deserialize, Serialize};
 

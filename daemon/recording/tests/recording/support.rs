@@ -2,9 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use dynocar::config::DaemonConfig;
+use dynocar::config::{DaemonConfig, build_pipeline};
 use dynocar::dataset;
-use dynocar::pipelines::build_pipeline;
 use dynocar_analysis::identify::published_samples;
 use dynocar_mcap::topic::Message;
 use dynocar_mcap::writing::{CONFIGURATION, RecordingWriter, WallClock, folder_of_configuration};

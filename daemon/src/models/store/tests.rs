@@ -1,6 +1,6 @@
-use super::super::moment::UtcSecond;
 use super::super::origin::{FoundEffect, ModelFigure};
 use super::*;
+use crate::stamp::UtcSecond;
 
 const TRAIN: &str = "[train]\nmass_t=100\nlength_m=80\nrotating_mass_factor=0.05\n\
     [resistance]\na=1\nb=0\nc=0\n";
@@ -146,7 +146,7 @@ fn a_decision_that_cannot_be_read_is_no_other_history() {
     let (_directory, models) = empty();
     let hash = models.put(&model(1.0, None, 1)).unwrap();
     models.decide(&decision(ModelChoice::Adopt(hash))).unwrap();
-    let path = numbered::path_of(&models.folder().join(DECISIONS), 1);
+    let path = records::path_of(&models.folder().join(DECISIONS), 1);
     std::fs::write(&path, "action = 'adopted'\nby = 3\n").unwrap();
     let message = models.in_force().unwrap_err().to_string();
     assert!(message.starts_with(&format!("{}: no record", path.display())), "{message}");

@@ -3,7 +3,6 @@
 //! 80 x 24 characters hold everything; larger terminals get the resistance at more speeds and plots.
 
 mod overview;
-mod plots;
 mod style;
 
 use ratatui::Frame;

@@ -6,8 +6,7 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap};
 
-use super::plots::{self, sparkline};
-use super::style::{Palette, heading};
+use super::style::{Palette, draw_plots, heading, sparkline};
 use crate::state::{PipelineState, PlotPoint, TrainState};
 use crate::words::{QuantityRow, residual, rows};
 
@@ -42,7 +41,7 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, train: &TrainState, palette: Pale
     .areas(area);
     frame.render_widget(text, upper);
     if has_plots && let Some(pipeline) = train.residual() {
-        plots::draw(frame, lower, &pipeline.history, palette);
+        draw_plots(frame, lower, &pipeline.history, palette);
     }
 }
 

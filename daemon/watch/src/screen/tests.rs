@@ -12,7 +12,7 @@ use ratatui::backend::TestBackend;
 use ratatui::buffer::Buffer;
 use ratatui::style::Color;
 
-use crate::plain;
+use crate::cli::line;
 use crate::screen::{Palette, ScreenChoice, ScreenView, draw};
 use crate::state::{Daemon, PipelineState, PlotHistory, TrainState};
 
@@ -201,7 +201,7 @@ fn every_size_is_drawn_and_too_small_ones_say_so() {
 
 #[test]
 fn a_line_says_all_of_a_train() {
-    let line = plain::line(&suspected());
+    let line = line(&suspected());
     for part in [
         "train 1: daemon 0.1.0 (process 4711)",
         "resistance usable (weak_excitation)",

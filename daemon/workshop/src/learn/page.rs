@@ -4,10 +4,9 @@
 use std::collections::BTreeSet;
 use std::time::SystemTime;
 
-use dynocar::models::decision::in_force_after;
 use dynocar::models::history::{ModelHistory, State};
-use dynocar::models::numbered::Numbered;
 use dynocar::models::origin::HeldOutError;
+use dynocar::models::records::{Numbered, in_force_after};
 use dynocar::models::{Action, Decision, MaintenanceEvent, ModelHash, Origin, Stored, UtcSecond};
 use dynocar::shadow::record::TrialRecord;
 use dynocar_model::words::kind_name;

@@ -7,7 +7,7 @@ use sha2::{Digest, Sha256};
 
 use crate::dataset;
 use dynocar::dataset::{DatasetSource, LoadError};
-use dynocar::models::moment::UtcSecond;
+use dynocar::stamp::UtcSecond;
 
 /// A file and the digest of its content.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -10,8 +10,7 @@ mod pipelines;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
-use dynocar::config::DaemonConfig;
-use dynocar::pipelines::build_pipeline;
+use dynocar::config::{DaemonConfig, build_pipeline};
 use dynocar_shared::schema::unit_of;
 use dynocar_shared::{
     HALF_95, Parameter, ParameterSnapshot, Quantity, Reason, TrainId, TrainSample,

@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use dynocar::config::{DaemonConfig, TrainConfig};
-use dynocar::pipelines::build_pipeline;
+use dynocar::config::{DaemonConfig, TrainConfig, build_pipeline};
 use dynocar_core::pipeline::Pipeline;
 use dynocar_shared::{ParameterSnapshot, TrainSample};
 

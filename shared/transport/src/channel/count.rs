@@ -17,11 +17,11 @@ use rustix::fs::{FallocateFlags, OFlags};
 use rustix::io::Errno;
 use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
 
+use super::service::Payload;
 use super::users::{COUNT_SUFFIX as SUFFIX, Users, full};
-use super::wire::Payload;
+use crate::announcement::SHARED_MEMORY;
 use crate::error::ChannelError;
 use crate::host::{Host, unusable};
-use crate::identity::SHARED_MEMORY;
 
 /// Pipeline threads that a page has room for: as many as can receive a train's samples.
 const THREADS_MAX: usize = TrainSample::RECEIVERS_MAX;

@@ -5,17 +5,14 @@
 //! them.
 
 mod count;
-mod ports;
 pub(crate) mod process;
 mod service;
 mod transport;
 mod users;
 mod wake;
-mod wire;
 
 pub use count::SampleCount;
-pub use ports::{Ends, Receiver, Sender};
 pub use process::Owner;
-pub use transport::Transport;
+pub use service::{Payload, Wire};
+pub use transport::{Ends, Receiver, Sender, Transport};
 pub use wake::{Sleeper, Waker};
-pub use wire::{Payload, Wire};

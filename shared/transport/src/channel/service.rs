@@ -2,22 +2,24 @@
 //!
 //! This way the transport's generic code, some thousand functions, is compiled once, in this crate, and not in every
 //! crate that opens or drops a port.
+//!
+//! Here are also the types that cross the shared memory, in the form that the transport requires.
 
 use std::fmt::Debug;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use dynocar_shared::TrainId;
+use dynocar_shared::services::{Channel, PIPELINES_MAX, SAMPLE_BUFFER};
+use dynocar_shared::{ParameterSnapshot, SleeperState, TrainId, TrainSample};
 use iceoryx2::node::{NodeState, NodeView};
-use iceoryx2::prelude::{MessagingPattern, Node, Service, ServiceName, ipc};
+use iceoryx2::prelude::{MessagingPattern, Node, Service, ServiceName, ZeroCopySend, ipc};
 use iceoryx2::service::builder::publish_subscribe::{
     PublishSubscribeCreateError, PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
 };
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
+use super::process::Owned;
 use super::users::Users;
-use super::wire::{Payload, Wire};
-use crate::channel::process::Owned;
 use crate::error::ChannelError;
 
 /// Longest wait for a service that another process is making or destroying.
@@ -186,5 +188,63 @@ impl<P: Debug + 'static> Held<P> {
 
     pub(super) fn get(&self) -> &P {
         self.0.held()
+    }
+}
+
+/// A payload under its wire name, which carries the layout hash.
+#[derive(Clone, Copy, Debug)]
+#[repr(transparent)]
+pub struct Wire<T>(pub T);
+
+mod sealed {
+    pub trait Sealed {}
+    impl Sealed for dynocar_shared::TrainSample {}
+    impl Sealed for dynocar_shared::ParameterSnapshot {}
+    impl Sealed for dynocar_shared::SleeperState {}
+}
+
+/// A type with a channel of its own.
+pub trait Payload: sealed::Sealed + Copy + Debug + 'static {
+    /// The channel.
+    const CHANNEL: Channel;
+    /// The type's name on the channel.
+    const WIRE_NAME: &'static str;
+    /// Messages a receiver holds before the oldest is overwritten.
+    const BUFFER: usize = 1;
+    /// Messages a sender keeps for receivers that come later.
+    const HISTORY: usize = 1;
+    /// The most senders of one train's channel.
+    const SENDERS_MAX: usize;
+    /// The most receivers of one train's channel: pipeline threads, recorder, live view.
+    const RECEIVERS_MAX: usize = 12;
+}
+
+impl Payload for TrainSample {
+    const CHANNEL: Channel = Channel::Samples;
+    const WIRE_NAME: &'static str = TrainSample::WIRE_NAME;
+    const BUFFER: usize = SAMPLE_BUFFER;
+    const HISTORY: usize = 0;
+    /// The controller, and a dead one that is not cleared away yet.
+    const SENDERS_MAX: usize = 4;
+}
+
+impl Payload for ParameterSnapshot {
+    const CHANNEL: Channel = Channel::Snapshots;
+    const WIRE_NAME: &'static str = ParameterSnapshot::WIRE_NAME;
+    /// Each pipeline has a sender of its own; twice, for a dead daemon not cleared away yet.
+    const SENDERS_MAX: usize = 2 * PIPELINES_MAX;
+}
+
+impl Payload for SleeperState {
+    const CHANNEL: Channel = Channel::Sleepers;
+    const WIRE_NAME: &'static str = SleeperState::WIRE_NAME;
+    const SENDERS_MAX: usize = PIPELINES_MAX;
+}
+
+// SAFETY: a payload is a `repr(C)` struct of plain numbers without padding (checked when it is
+// compiled), holds no pointer, index or handle, and its name carries a hash of its whole layout.
+unsafe impl<T: Payload> ZeroCopySend for Wire<T> {
+    unsafe fn type_name() -> &'static str {
+        T::WIRE_NAME
     }
 }

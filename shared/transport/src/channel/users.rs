@@ -17,10 +17,10 @@ use iceoryx2::prelude::{CallbackProgression, Node, ipc};
 use rustix::fs::{Access, FallocateFlags, access};
 use rustix::io::Errno;
 
+use crate::announcement::SHARED_MEMORY;
 use crate::channel::process::LockedFile;
 use crate::error::ChannelError;
 use crate::host::{Host, open_private, unusable};
-use crate::identity::SHARED_MEMORY;
 
 /// Ending of the segment's name.
 const SUFFIX: &str = ".global_mgmt";

@@ -4,9 +4,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use dynocar::config::{DaemonConfig, TrainConfig};
+use dynocar::config::{DaemonConfig, TrainConfig, build_pipeline};
 use dynocar::models::{ModelHash, ModelText, NewModel, Origin, Store, TrainModels, UtcSecond};
-use dynocar::pipelines::build_pipeline;
 use dynocar::runtime::exchange::Exchange;
 use dynocar::shadow::in_force::with_model;
 use dynocar::shadow::{ShadowTrain, record};

@@ -7,8 +7,7 @@
 use std::sync::Arc;
 
 use dynocar_core::trial::evidence::RivalEvidence;
-use dynocar_core::trial::ledger::{Ledger, OpenLoop};
-use dynocar_core::trial::{ModelTrials, Rival};
+use dynocar_core::trial::{Ledger, ModelTrials, OpenLoop, Rival};
 use dynocar_model::train::TrainModel;
 use dynocar_shared::{TrainId, TrainSample};
 

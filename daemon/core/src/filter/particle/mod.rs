@@ -1,15 +1,11 @@
 //! Bootstrap particle filter and marginal particle smoother (Doucet, Godsill, Andrieu 2000; Xie 2019, eq. 24-27; Jin
-//! 2020, eq. 22-25).
+//! 2020, eq. 22-25), with systematic resampling without a search.
 
 use std::f64::consts::LOG2_E;
 use std::ops::Range;
 
-use resampling::find_ancestors;
-
 use super::lanes;
 use super::random::Random;
-
-mod resampling;
 
 /// A Markov model of a state of `D` components, observed at every step.
 ///
@@ -316,6 +312,38 @@ fn normalise_logarithms(weights: &mut [f64]) -> Option<()> {
     let scale = 1.0 / sum;
     weights.iter_mut().for_each(|weight| *weight *= scale);
     Some(())
+}
+
+/// Finds the ancestor of each place, the particle that it is drawn from: the ancestor of place p is the first particle
+/// whose cumulated weight exceeds the level p + `offset`, where all weights together are scaled to the number of
+/// particles. `offset` lies in 0 to 1; `ancestors` holds one place more than there are weights, the last without
+/// meaning.
+///
+/// Each particle marks the place from which on later particles are drawn; the highest mark up to a place is its
+/// ancestor. A search for the ancestor would take a branch that no processor can foresee.
+///
+/// # Real-time
+///
+/// Allocates nothing; work proportional to the weights.
+fn find_ancestors(weights: &[f64], offset: f64, ancestors: &mut [usize]) {
+    let Some(last) = weights.len().checked_sub(1) else { return };
+    ancestors.fill(0);
+    // Weights sum to 1 but for rounding.
+    let scale = weights.len() as f64 / lanes::sum(weights);
+    let mut sum = 0.0;
+    for (particle, weight) in weights[..last].iter().enumerate() {
+        sum += weight;
+        // The levels below `sum`: their number, rounded up.
+        let level = sum * scale - offset;
+        let whole = level as u32;
+        let below = whole + u32::from(f64::from(whole) < level);
+        ancestors[(below as usize).min(last + 1)] = particle + 1;
+    }
+    let mut highest = 0;
+    for ancestor in ancestors {
+        highest = highest.max(*ancestor);
+        *ancestor = highest;
+    }
 }
 
 #[cfg(test)]

@@ -138,3 +138,44 @@ fn a_measurement_that_no_particle_explains_is_an_error_with_its_step() {
     assert_eq!(failed, Err(ParticleError::Degenerate { step: 3 }));
     assert_eq!(smoother.smoothed_moments(0), None, "a failed run leaves nothing behind");
 }
+
+/// Returns the ancestors by a search.
+fn found(weights: &[f64], offset: f64) -> Vec<usize> {
+    let spacing = weights.iter().sum::<f64>() / weights.len() as f64;
+    let (mut ancestor, mut cumulated) = (0, weights[0]);
+    (0..weights.len())
+        .map(|index| {
+            let level = (index as f64 + offset) * spacing;
+            while ancestor + 1 < weights.len() && cumulated <= level {
+                ancestor += 1;
+                cumulated += weights[ancestor];
+            }
+            ancestor
+        })
+        .collect()
+}
+
+#[test]
+fn the_ancestors_are_those_that_a_search_finds() {
+    let mut random = Random::new(5);
+    for round in 0..500 {
+        let count = 1 + round % 33;
+        // Some weights vanish, some are nearly all.
+        let weights: Vec<f64> =
+            (0..count).map(|_| (random.uniform() - 0.2).max(0.0).powi(5) + 1e-300).collect();
+        let offset = random.uniform();
+        let mut ancestors = vec![0; count + 1];
+        find_ancestors(&weights, offset, &mut ancestors);
+        assert_eq!(ancestors[..count], found(&weights, offset), "round {round}");
+    }
+}
+
+#[test]
+fn a_particle_of_all_the_weight_is_every_place_s_ancestor() {
+    for heavy in 0..4 {
+        let weights: Vec<f64> = (0..4).map(|i| f64::from(u8::from(i == heavy))).collect();
+        let mut ancestors = [0; 5];
+        find_ancestors(&weights, 0.5, &mut ancestors);
+        assert_eq!(ancestors[..4], [heavy; 4]);
+    }
+}

@@ -28,7 +28,7 @@ use super::estimator::{Estimator, Outcome};
 use super::judge::{InputState, missing};
 use crate::plausibility::watch::PlausibilityWatch;
 use crate::plausibility::window_balance::WindowMean;
-use crate::plausibility::{DetectedFault, DetectedFaults, diagnosis};
+use crate::plausibility::{DetectedFault, DetectedFaults, diagnose};
 
 /// Judges the samples of one train, in order, for one estimator or for a reader of recorded runs.
 #[derive(Clone, Debug)]
@@ -137,7 +137,7 @@ impl Admission {
 
     fn watch(&mut self, sample: &TrainSample, is_valid: bool, gradient_permille: Option<f64>) {
         if self.watch.take(sample, is_valid, gradient_permille) {
-            self.detected = diagnosis::diagnose(&self.watch.figures());
+            self.detected = diagnose(&self.watch.figures());
         }
     }
 

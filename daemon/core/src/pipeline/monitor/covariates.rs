@@ -6,7 +6,7 @@ use dynocar_model::terms::SuspectInput;
 use dynocar_model::train::Davis;
 use nalgebra::SVector;
 
-use super::suspects::{COVARIATES, covariate};
+use super::{COVARIATES, covariate};
 use crate::pipeline::momentum::UnitSample;
 
 /// One value for each column that comes from samples.

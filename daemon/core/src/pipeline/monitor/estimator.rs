@@ -6,15 +6,15 @@ use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
 use nalgebra::{Vector1, Vector3};
 
-use super::MonitorSettings;
 use super::covariates::{CovariateImpulse, PlaceMemory, RunClock, covariates};
 use super::information::{BaseVector, MonitorInformation, usual};
 use super::rows::{DesignRow, ParameterVector, Rows, units};
-use super::suspects::{
-    BANK, BASE, DAY_WIND, FIRST_ONSET, LOAD, ONSETS, Onsets, ReleasedPressure, SUSPECTS, suspect_of,
-};
 use super::verdict::{MonitorVerdict, ResidualEvidence};
 use super::wheel_scale::WheelScale;
+use super::{
+    BANK, BASE, DAY_WIND, FIRST_ONSET, LOAD, MonitorSettings, ONSETS, Onsets, ReleasedPressure,
+    SUSPECTS, suspect_of,
+};
 use crate::pipeline::judge::{InputState, Judgement, StatusInputs};
 use crate::pipeline::momentum::blocks::MomentumBlocks;
 use crate::pipeline::momentum::{

@@ -9,9 +9,8 @@
 use dynocar_model::train::TrainModel;
 use nalgebra::{SMatrix, SVector};
 
-use super::MonitorSettings;
 use super::rows::{DesignRow, ParameterVector};
-use super::suspects::{BASE, CURVE, DAY_WIND, LOAD, PARAMETERS, WARMING};
+use super::{BASE, CURVE, DAY_WIND, LOAD, MonitorSettings, PARAMETERS, WARMING};
 use crate::filter::NotPositiveDefinite;
 use crate::pipeline::momentum::{
     BRAKE_SCALE, DataSettings, FORCE_DELAY, SPEED_SCALE_MPS, TRACTION_SCALE, scaled,

@@ -2,7 +2,7 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::suspects::{CANDIDATES, FIRST_ONSET, Onsets, PARAMETERS, effect_of};
+use super::{CANDIDATES, FIRST_ONSET, Onsets, PARAMETERS, effect_of};
 use crate::pipeline::InnovationMonitor;
 use crate::pipeline::momentum::FORCE_DELAY;
 
@@ -251,9 +251,9 @@ fn alternatives(chosen: usize, least: f64, standing: &CandidateEvidence) -> u32 
 
 #[cfg(test)]
 mod tests {
-    use super::super::suspects::WHEEL;
     use super::*;
     use crate::pipeline::momentum::FORCE_DELAY as DELAY;
+    use crate::pipeline::monitor::WHEEL;
 
     fn after(naming: &mut Naming, blocks: u32, evidence: &[(usize, f64)]) {
         after_with(naming, &Onsets::new(), blocks, evidence);

@@ -4,9 +4,8 @@ use dynocar_model::terms::wind;
 use dynocar_model::train::Davis;
 use nalgebra::{SMatrix, SVector};
 
-use super::MonitorSettings;
 use super::covariates::Covariates;
-use super::suspects::{COVARIATES, FIRST_ONSET, ONSETS, Onsets, PARAMETERS};
+use super::{COVARIATES, FIRST_ONSET, MonitorSettings, ONSETS, Onsets, PARAMETERS};
 use crate::filter::Whitener;
 use crate::pipeline::momentum::{
     DISTURBANCE, Disturbance, MomentumBlock, STATES, UNKNOWNS, gap_s, momentum_seen,

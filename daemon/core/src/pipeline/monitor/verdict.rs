@@ -2,13 +2,12 @@
 
 use dynocar_model::terms::{Least, delay};
 
-use super::MonitorSettings;
 use super::information::{Alternative, BaseSolution, MonitorInformation};
 use super::naming::{CandidateEvidence, Naming};
 use super::rows::ParameterVector;
-use super::suspects::{
-    BASE, CANDIDATES, FIRST_BAND, FIRST_ONSET, Onsets, PARAMETERS, SEARCHED, SUSPECTS, UNUSUAL,
-    WHEEL, suspect_of,
+use super::{
+    BASE, CANDIDATES, FIRST_BAND, FIRST_ONSET, MonitorSettings, Onsets, PARAMETERS, SEARCHED,
+    SUSPECTS, UNUSUAL, WHEEL, suspect_of,
 };
 use crate::pipeline::InnovationMonitor;
 use crate::pipeline::momentum::{FORCE_DELAY, UNKNOWNS};

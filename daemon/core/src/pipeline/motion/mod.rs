@@ -14,12 +14,10 @@ use dynocar_shared::ParameterSnapshot;
 use super::admission::limits::{INNOVATION, REPEATED};
 use crate::filter::{Gaussian, Innovation, NotPositiveDefinite};
 
-pub use dynocar_model::terms::wheel::STANDING_MPS;
-pub use position_noise::PositionNoise;
-pub use speed_noise::{Rounding, SpeedNoise};
+mod noise;
 
-mod position_noise;
-mod speed_noise;
+pub use dynocar_model::terms::wheel::STANDING_MPS;
+pub use noise::{PositionNoise, Rounding, SpeedNoise};
 
 /// Speed in m/s up to which nothing is learned of a train's motion: holding brakes, slack and starting
 /// resistance are no part of the model.

@@ -9,9 +9,8 @@ use dynocar_model::train::TrainModel;
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Quantity, RejectionReason};
 
 use super::TrainKalmanSettings;
-use super::brake_errors::BrakeErrors;
-use super::learned_state::{JumpShare, LearnedState, ResistanceBelief};
-use super::load::{LoadChange, LoadWatch};
+use super::forces::BrakeErrors;
+use super::learned_state::{JumpShare, LearnedState, LoadChange, LoadWatch, ResistanceBelief};
 use super::motion_bank::SpeedLikelihood;
 use super::motion_filter::{FORCE_DELAY, LOAD, SPEED, wind_over};
 use super::report::{Systematic, TrainKalmanReport};

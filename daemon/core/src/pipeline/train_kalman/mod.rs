@@ -17,11 +17,9 @@ use crate::settings;
 pub use estimator::TrainKalman;
 pub use learned_state::declared_a_std;
 
-mod brake_errors;
 mod estimator;
-mod force_history;
+mod forces;
 mod learned_state;
-mod load;
 mod motion_bank;
 mod motion_filter;
 mod report;

@@ -5,8 +5,7 @@ use dynocar_model::terms::wind;
 use dynocar_model::track::{gradient_error_kept, gradient_error_of_mean};
 
 use super::TrainKalmanSettings;
-use super::brake_errors::BrakeErrors;
-use super::force_history::ForceHistory;
+use super::forces::{BrakeErrors, ForceHistory};
 use super::learned_state::{LearnedState, ResistanceBelief};
 use super::motion_filter::{FilterStep, Following, MapErrorStep, wind_over};
 use crate::pipeline::momentum::UnitSample;

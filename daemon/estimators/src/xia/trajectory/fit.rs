@@ -204,7 +204,7 @@ mod tests {
     use rand::RngExt;
 
     use super::super::step::StepRule;
-    use super::super::test_runs::{FAST, normal, random, speeds, steps};
+    use super::super::tests::{FAST, normal, random, speeds, steps};
     use super::*;
     use dynocar_core::filter::levenberg_marquardt::ParameterBox;
     use dynocar_model::force::mps2_per_n_per_kn;
@@ -318,7 +318,7 @@ mod tests {
 #[cfg(test)]
 mod integral_start_tests {
     use super::*;
-    use crate::xia::trajectory::test_runs::{FAST, normal, random, speeds, steps};
+    use crate::xia::trajectory::tests::{FAST, normal, random, speeds, steps};
     use dynocar_model::train::Davis;
 
     fn start(segments: &[MotionSegment<'_>], rule: StepRule) -> Vector3<f64> {

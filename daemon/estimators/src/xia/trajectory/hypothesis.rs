@@ -1,14 +1,13 @@
 //! A Kalman filter of [a, b, c, v] under one hypothesis about the last jump of (a, b, c).
 
 use dynocar_core::filter::bank::Mixture;
-use dynocar_core::filter::square_root::CovarianceFactor;
+use dynocar_core::filter::covariance::CovarianceFactor;
 use dynocar_core::pipeline::motion::OutlierRow;
 use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, SVector, Vector3};
 
 use super::noise::{LearnedNoise, NoiseModel};
-use super::step::{StepRule, TrajectoryStep};
-use super::unit_disturbance::UnitDisturbance;
+use super::step::{StepRule, TrajectoryStep, UnitDisturbance};
 use super::{A, B, C, SPEED};
 
 /// How often measured speeds are outliers, and their distribution.
@@ -220,7 +219,7 @@ pub fn united(one: (&JumpHypothesis, f64), other: (&JumpHypothesis, f64)) -> (Ju
 #[cfg(test)]
 mod tests {
     use super::super::fit::{DavisPrior, FitSettings, MotionSegment, TrajectoryFitter};
-    use super::super::test_runs::{FAST, normal, random, speeds, steps};
+    use super::super::tests::{FAST, normal, random, speeds, steps};
     use super::*;
     use dynocar_core::filter::levenberg_marquardt::ParameterBox;
     use dynocar_model::force::mps2_per_n_per_kn;

@@ -14,15 +14,12 @@ pub mod kalman;
 pub mod motion;
 pub mod noise;
 pub mod online;
-#[cfg(test)]
-mod pipeline_tests;
 pub mod quality;
 pub mod residuals;
 mod search;
 pub mod step;
 #[cfg(test)]
-mod test_runs;
-mod unit_disturbance;
+mod tests;
 
 /// Davis a.
 pub const A: usize = 0;

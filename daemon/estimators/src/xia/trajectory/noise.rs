@@ -235,7 +235,7 @@ impl LearnedNoise {
 mod tests {
     use super::super::hypothesis::{JumpHypothesis, OutlierModel};
     use super::super::step::{StepRule, TrajectoryStep};
-    use super::super::test_runs::{FAST, normal, random};
+    use super::super::tests::{FAST, normal, random};
     use super::*;
     use dynocar_model::force::mps2_per_n_per_kn;
     use nalgebra::Vector3;

@@ -217,7 +217,7 @@ impl OnlineFilter {
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_runs::{FAST, normal, random};
+    use super::super::tests::{FAST, normal, random};
     use super::*;
     use dynocar_model::force::mps2_per_n_per_kn;
 
