@@ -14,7 +14,7 @@
 //! - [`manifest`], [`train_file`], [`track_file`]: the three TOML files
 //! - [`quantity`]: quantities of columns, in their [`units`](dynocar_model::units)
 //! - [`text_layout`], [`clock`]: the division of text into cells, and times that are no numbers
-//! - `run_content`: contents of a run's file, text or columns
+//! - [`formats`], [`format`](mod@format): the formats of recorded runs, and the contents of a run's file, text or columns
 //! - `lines`, `header`, `cell`, `table`: a CSV file as columns of numbers
 //! - [`trains`]: files that hold several trains
 //! - `clock_faults`: times with an hour of summer time, seconds without a fraction, rows in another order
@@ -37,6 +37,8 @@ pub mod diagnostic;
 pub mod document;
 pub mod error;
 mod forces;
+pub mod format;
+pub mod formats;
 pub mod guess;
 pub mod keys;
 mod lines;
@@ -47,7 +49,6 @@ pub mod quality;
 pub mod quantity;
 mod resolved;
 pub mod run;
-mod run_content;
 mod speed_and_position;
 mod spikes;
 mod table;
@@ -67,13 +68,13 @@ pub use diagnostic::Diagnostic;
 pub use document::top_keys;
 pub use error::{DatasetError, FileProblem, SourcePosition};
 pub use forces::{ForceSource, is_stamped_late, stamped_late};
+pub use format::{RunColumn, RunColumns, RunContent, TrainColumn};
 pub use manifest::{ColumnMapping, FileEntry, Manifest, PositionReference, Role, RunEntry};
 pub use order::OrderCounts;
 pub use quality::{Phases, RunQuality};
 pub use quantity::Quantity;
 pub use resolved::{DATASET_TRAIN, GradientSource};
-pub use run::{EXTRAS, QuantitySeries, Run, is_parquet, recorded_unix_s};
-pub use run_content::{RunColumn, RunColumns, RunContent, TrainColumn};
+pub use run::{EXTRAS, QuantitySeries, Run, recorded_unix_s};
 pub use speed_and_position::PositionSource;
 pub use table::LineCounts;
 pub use text_layout::TextLayout;
@@ -121,6 +122,10 @@ impl DatasetFiles for [(&str, &str)] {
     fn read(&self, path: &str) -> Result<String, FileProblem> {
         let file = self.iter().find(|(name, _)| *name == path);
         file.map(|(_, text)| (*text).into()).ok_or(FileProblem::Missing)
+    }
+
+    fn read_run(&self, path: &str, _manifest: &Manifest) -> Result<RunContent, FileProblem> {
+        formats::of_run(path).rows(self.read(path)?).map(RunContent::Text)
     }
 }
 

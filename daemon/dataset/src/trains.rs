@@ -4,9 +4,9 @@ use std::borrow::Cow;
 
 use super::cell::truth;
 use super::error::{DatasetError, SourcePosition};
+use super::format::TrainColumn;
 use super::lines::{CellRow, RowReader, below};
 use super::quantity::Quantity;
-use super::run_content::TrainColumn;
 use super::table::Table;
 use super::text_layout::TextLayout;
 

@@ -3,33 +3,16 @@
 use std::borrow::Cow;
 use std::path::{Component, Path, PathBuf};
 
-use dynocar::dataset::{DatasetFolder, DatasetSource, LoadError, is_parquet_path};
+use dynocar::dataset::{DatasetFolder, DatasetSource, LoadError};
 use dynocar::output::report_line;
 use dynocar::text_file::require_regular;
 use dynocar_analysis::dataset::{
-    Dataset, DatasetFiles, DatasetHead, FileProblem, Manifest, RunContent, is_parquet,
+    Dataset, DatasetFiles, DatasetHead, FileProblem, Manifest, RunContent,
 };
-use dynocar_mcap::recording::Recording;
 use dynocar_model::units::Unit;
-use dynocar_parquet::columns::columns_of;
-use dynocar_parquet::reading;
 
 use super::convert::{ModelFiles, RecordedDataset, dataset_of};
-
-/// Returns true for the name of a recording.
-pub fn is_recording(path: &Path) -> bool {
-    let is_mcap = path.extension().is_some_and(|it| it == "mcap") && path.is_file();
-    is_mcap || is_parquet_path(path) && path.exists()
-}
-
-/// Reads the samples and the attached files of a recording.
-fn samples_of(path: &Path) -> Result<Recording, String> {
-    if is_parquet_path(path) {
-        let content = reading::read(path).map_err(|error| error.to_string())?;
-        return Ok(content.into_recording());
-    }
-    Recording::of_samples(&[path.to_path_buf()]).map_err(|error| error.to_string())
-}
+use super::formats::{self, RunFile, is_recording};
 
 /// The files of a dataset.
 #[derive(Clone, Debug)]
@@ -52,8 +35,9 @@ impl FilesOfDataset {
             return DatasetFolder::at(source).map(FilesOfDataset::Folder);
         }
         let read = || {
-            let train = source.train.map(|it| it.0);
-            dataset_of(source.path, samples_of(source.path)?, train, &ModelFiles::default())
+            let (paths, train) = ([source.path.to_path_buf()], source.train.map(|it| it.0));
+            let recording = (formats::of_recording(&paths).samples)(&paths)?;
+            dataset_of(source.path, recording, train, &ModelFiles::default())
                 .map_err(|error| error.to_string())
         };
         let refused = |problem| LoadError::Recording { path: source.path.into(), problem };
@@ -104,14 +88,13 @@ impl DatasetFiles for FilesOfDataset {
         let FilesOfDataset::Folder(folder) = self else {
             return self.files().read_run(path, manifest);
         };
-        if !is_parquet(path) {
+        let Some(read) = formats::run_reader(path) else {
             return folder.read_run(path, manifest);
-        }
+        };
         let file = folder.path_of(path);
         require_regular(&file)?;
-        columns_of(&file, &manifest.columns, &manifest.train_rows)
+        read(RunFile::OnDisk(&file), &manifest.columns, &manifest.train_rows)
             .map(RunContent::Columns)
-            .map_err(|problem| FileProblem::Table(problem.to_string()))
     }
 
     fn label(&self, path: &str) -> String {

@@ -9,6 +9,7 @@
 //! - [`cli`]: its commands, one file each
 //! - [`convert`], [`from_dataset`]: recordings to datasets, in memory or in a folder, and back
 //! - [`dataset`]: the dataset at a path, be it a folder or a recording
+//! - [`formats`]: the libraries of the formats that are not text
 //! - [`fmu`]: the estimators as an FMU
 //! - [`learn`]: recorded runs into candidates for the store
 //! - [`updated`]: the model with its effects as train and track files, and a dataset of them
@@ -31,6 +32,7 @@ pub mod cli;
 pub mod convert;
 pub mod dataset;
 pub mod fmu;
+pub mod formats;
 pub mod from_dataset;
 pub mod learn;
 pub mod report;

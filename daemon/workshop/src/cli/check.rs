@@ -17,6 +17,7 @@ use dynocar_shared::TrainId;
 use serde::Serialize;
 
 use crate::dataset;
+use crate::formats::is_recording;
 use dynocar::cli::Failure;
 use dynocar::dataset::{DatasetSource, FileKind, LoadError, kind_of, labelled_text};
 use dynocar::output::{give, require_file, require_folder};
@@ -72,7 +73,7 @@ pub enum SamplesOfRuns {
 /// When the path leads to no known kind of file, or a file that everything rests on is wrong.
 pub fn understand(source: DatasetSource, samples: SamplesOfRuns) -> Result<Understood, Failure> {
     let path = source.path;
-    if source.train.is_some() || !path.is_file() || dataset::is_recording(path) {
+    if source.train.is_some() || !path.is_file() || is_recording(path) {
         return read_dataset(source, samples);
     }
     let (label, text) = labelled_text(path)?;

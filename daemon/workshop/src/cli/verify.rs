@@ -5,12 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 use dynocar::cli::Failure;
 use dynocar::config::DaemonConfig;
-use dynocar::dataset::is_parquet_path;
 use dynocar::output::{print, report_line};
-use dynocar_mcap::error::CopyError;
-use dynocar_mcap::recording::Recording;
 
-use super::convert::one;
+use crate::formats;
 use crate::verify::{ComparisonOutcome, Configurations, overlay, text, verify};
 
 /// Compute every recorded snapshot again.
@@ -31,11 +28,7 @@ pub struct VerifyArguments {
 /// When the recording holds no snapshots or no configuration, or a computed snapshot differs.
 pub fn execute(arguments: &VerifyArguments) -> Result<(), Failure> {
     let VerifyArguments { recording: paths, with } = arguments;
-    let recording = &if paths.iter().any(|it| is_parquet_path(it)) {
-        one(paths)?.into_recording()
-    } else {
-        Recording::load_all(paths).map_err(CopyError::from)?
-    };
+    let recording = &(formats::of_recording(paths).whole)(paths).map_err(Failure::Input)?;
     let path = &paths[0];
     if let Some(broken) = &recording.broken {
         report_line(&format!("dynocar: {broken}"));

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use dynocar::text_file::{require_text, text_of};
 use dynocar_analysis::dataset::text_layout::decoded;
-use dynocar_analysis::dataset::{DatasetFiles, FileProblem, Manifest, RunContent, is_parquet};
-use dynocar_parquet::columns::columns_of_bytes;
+use dynocar_analysis::dataset::{DatasetFiles, FileProblem, Manifest, RunContent, formats};
 use dynocar_shared::TrainSample;
 
 use super::rows::{columns_of_samples, to_rows};
+use crate::formats::{RunFile, run_reader};
 
 /// Contents of a file.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,15 +69,15 @@ impl DatasetFiles for RecordedDataset {
             FileContent::Samples(samples) => {
                 Ok(RunContent::Columns(columns_of_samples(samples, &manifest.columns)))
             }
-            FileContent::Bytes(bytes) if is_parquet(path) => {
-                columns_of_bytes(bytes.clone(), &manifest.columns, &manifest.train_rows)
-                    .map(RunContent::Columns)
-                    .map_err(|problem| FileProblem::Table(problem.to_string()))
-            }
             FileContent::Bytes(bytes) => {
+                if let Some(read) = run_reader(path) {
+                    return read(RunFile::Attached(bytes), &manifest.columns, &manifest.train_rows)
+                        .map(RunContent::Columns);
+                }
                 let encoding = manifest.layout.encoding;
                 require_text(bytes, encoding)?;
-                decoded(bytes.clone(), encoding).map(RunContent::Text)
+                let text = decoded(bytes.clone(), encoding)?;
+                formats::of_run(path).rows(text).map(RunContent::Text)
             }
         }
     }

@@ -5,6 +5,7 @@ use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
+use dynocar_analysis::dataset::formats::MCAP;
 use dynocar_analysis::dataset::{MANIFEST_FILE, Manifest, RunEntry, recorded_unix_s};
 use dynocar_shared::TrainId;
 use sha2::{Digest, Sha256};
@@ -121,8 +122,7 @@ fn look(folder: &Path, depth: usize, lying: &mut Lying) -> io::Result<()> {
         if path.is_dir() && depth > 0 {
             // A folder that has gone or is closed holds no runs.
             let _ = look(&path, depth - 1, lying);
-        } else if path.extension().is_some_and(|it| it == "mcap") && recordings::is_finished(&path)
-        {
+        } else if MCAP.is_of(&path) && recordings::is_finished(&path) {
             lying.recordings.push(path);
         }
     }
@@ -140,7 +140,7 @@ fn is_of(train: TrainId, path: &Path, places: Places) -> bool {
     let named = inside.components().filter_map(number).find(|it| places.trains.contains(it));
     match named {
         Some(named) => named == train,
-        None => places.trains.len() == 1 || path.extension().is_some_and(|it| it == "mcap"),
+        None => places.trains.len() == 1 || MCAP.is_of(path),
     }
 }
 

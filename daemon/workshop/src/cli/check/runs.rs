@@ -4,7 +4,7 @@ use std::iter;
 
 use dynocar_analysis::dataset::quality::{QuantityCount, ReasonCount};
 use dynocar_analysis::dataset::{
-    DatasetDiagnostic, DatasetError, Manifest, Phases, Quantity, Role, Run, RunQuality, is_parquet,
+    DatasetDiagnostic, DatasetError, Manifest, Phases, Quantity, Role, Run, RunQuality, formats,
 };
 use dynocar_core::plausibility::InputFault;
 
@@ -179,7 +179,7 @@ fn diagnostics(manifest: &Manifest, runs: &[Read], of_dataset: &[DatasetDiagnost
 /// Returns a time of a run: in s, as a date where it counts from 1970, or as the clock that its file shows.
 fn time(manifest: &Manifest, run: &Run, time_s: f64) -> String {
     let has_format = manifest.mapping(Quantity::Time).is_some_and(|it| it.format.is_some());
-    if !has_format || is_parquet(&run.file) {
+    if !has_format || formats::of_run(&run.file).needs_library() {
         let in_s = || format!("{} s", short(time_s, 3));
         return moment(time_s).map_or_else(in_s, |it| it.to_string());
     }
