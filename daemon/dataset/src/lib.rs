@@ -18,9 +18,8 @@
 //! - `lines`, `header`, `cell`, `table`: a CSV file as columns of numbers
 //! - [`trains`]: files that hold several trains
 //! - `clock_faults`: times with an hour of summer time, seconds without a fraction, rows in another order
-//! - `order`, `spikes`, `motion`, `forces`, `altitude`: from columns to time, speed,
-//!   position, forces and gradient
-//! - `resolved`, [`run`], [`quality`], [`diagnostic`], [`dataset_diagnostic`], `diagnosing`, `declared`: samples,
+//! - `order`, `speed_and_position`, `forces`, `altitude`: from columns to time, speed, position, forces and gradient
+//! - `resolved`, [`run`], [`quality`], [`diagnostic`], [`dataset_diagnostic`], `diagnosing`: samples,
 //!   counts and warnings
 //! - [`written`]: writers of the three TOML files, and of changes in declared ones
 //! - [`guess`]: a description of files that nobody has described yet
@@ -31,7 +30,6 @@ pub mod clock;
 mod clock_faults;
 mod corrections;
 pub mod dataset_diagnostic;
-mod declared;
 mod diagnosing;
 pub mod diagnostic;
 pub mod document;
@@ -50,13 +48,11 @@ pub mod quantity;
 mod resolved;
 pub mod run;
 mod speed_and_position;
-mod spikes;
 mod table;
 pub mod text_layout;
 pub mod track_file;
 pub mod train_file;
 pub mod trains;
-mod unusual_resistance;
 pub mod written;
 
 #[cfg(test)]
@@ -64,6 +60,7 @@ mod tests;
 
 pub use clock::TimeFormat;
 pub use dataset_diagnostic::DatasetDiagnostic;
+pub use dataset_diagnostic::unusual_resistance;
 pub use diagnostic::Diagnostic;
 pub use document::top_keys;
 pub use error::{DatasetError, FileProblem, SourcePosition};
@@ -80,7 +77,6 @@ pub use table::LineCounts;
 pub use text_layout::TextLayout;
 pub use track_file::parse_track;
 pub use train_file::parse_train;
-pub use unusual_resistance::unusual_resistance;
 
 use std::sync::Arc;
 

@@ -16,8 +16,8 @@ use prost_types::{
     FileDescriptorProto, FileDescriptorSet, OneofDescriptorProto,
 };
 
+use crate::event::MessageField;
 use crate::event::{Event, EventKind};
-use crate::message::MessageField;
 
 /// Name of the message of a sample.
 pub const SAMPLE: &str = "dynocar.TrainSample";

@@ -5,7 +5,7 @@ use dynocar_model::units::{Dimension, Unit, is_unit};
 use super::facts::{Facts, TextCell};
 use super::guessed::GuessedColumn;
 use super::name::{Name, readings, scaled_unit};
-use super::vocabulary::{TermWeight, VOCABULARY, listed, terms};
+use super::name::{TermWeight, VOCABULARY, listed, terms};
 use crate::Quantity;
 use crate::error::nearest;
 

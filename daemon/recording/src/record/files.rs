@@ -12,11 +12,10 @@ use dynocar_mcap::writing::McapError;
 use dynocar_shared::TrainId;
 use dynocar_transport::monotonic_now_ns;
 
-use super::configuration::Configuration;
 use super::housekeeping::{Housekeeper, Rotation, Task};
 use super::keeping::{self, EventKeeper};
 use super::ring::next;
-use super::{RecordError, Recorded};
+use super::{Configuration, RecordError, Recorded};
 use dynocar_mcap::event::{Event, EventKind};
 use dynocar_mcap::topic::Message;
 use dynocar_mcap::writing::{CONFIGURATION, RecordingWriter, WallClock, folder_of_configuration};

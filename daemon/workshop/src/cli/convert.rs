@@ -9,8 +9,8 @@ use dynocar_analysis::dataset::formats::MCAP;
 use dynocar_parquet::writing::Written;
 
 use crate::convert::{ModelFiles, Unpacked, unpack};
+use crate::dataset::from_dataset;
 use crate::formats::{self, Exchange, is_recording};
-use crate::from_dataset::from_dataset;
 
 /// Convert recordings between MCAP, CSV datasets and Parquet.
 #[derive(Debug, Args)]

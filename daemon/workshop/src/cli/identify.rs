@@ -1,6 +1,5 @@
 //! `dynocar identify`: the daemon's pipelines over recorded runs.
 
-mod answer;
 mod runs;
 
 use std::path::PathBuf;
@@ -14,8 +13,7 @@ use dynocar_model::units::Unit;
 use dynocar_shared::{HALF_95, Parameter, TrainId, schema};
 use serde::Serialize;
 
-use self::answer::EstimatorAnswer;
-use self::runs::{EstimatorSpread, RunAnswer};
+use self::runs::{EstimatorAnswer, EstimatorSpread, RunAnswer};
 use crate::dataset;
 use crate::run_facts::diagnostics;
 use dynocar::cli::Failure;

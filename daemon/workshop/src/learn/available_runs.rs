@@ -11,8 +11,8 @@ use dynocar_shared::TrainId;
 use sha2::{Digest, Sha256};
 use tracing::warn;
 
-use super::memory::{KnownFile, LearnerMemory};
-use super::{LearnError, recordings};
+use super::LearnError;
+use super::memory::{KnownFile, LearnerMemory, is_finished, take_up, unpacked_in};
 use crate::report::provenance::hex;
 use dynocar::dataset::read_text;
 use dynocar::models::UtcSecond;
@@ -87,14 +87,14 @@ pub fn runs_of(
     let unpacked = places.own.join("runs").join(train.0.to_string());
     for path in lying.recordings.iter().filter(is_own) {
         let Ok((sha256, modified)) = hash_of(path, memory) else { continue };
-        recordings::take_up((path, &sha256), train, (&unpacked, memory), modified)?;
+        take_up((path, &sha256), train, (&unpacked, memory), modified)?;
     }
     let mut runs = Vec::new();
     for folder in lying.datasets.iter().filter(is_own) {
         let name = folder.strip_prefix(places.runs).unwrap_or(folder).display().to_string();
         runs.extend(runs_in(folder, &name, None, memory));
     }
-    for (folder, source) in recordings::unpacked_in(&unpacked) {
+    for (folder, source) in unpacked_in(&unpacked) {
         runs.extend(runs_in(&folder, &source.name, Some(source.recorded), memory));
     }
     let newest = runs.iter().map(|run| run.recorded).max().unwrap_or(now).min(now);
@@ -122,7 +122,7 @@ fn look(folder: &Path, depth: usize, lying: &mut Lying) -> io::Result<()> {
         if path.is_dir() && depth > 0 {
             // A folder that has gone or is closed holds no runs.
             let _ = look(&path, depth - 1, lying);
-        } else if MCAP.is_of(&path) && recordings::is_finished(&path) {
+        } else if MCAP.is_of(&path) && is_finished(&path) {
             lying.recordings.push(path);
         }
     }
