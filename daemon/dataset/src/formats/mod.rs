@@ -7,11 +7,7 @@ use std::path::Path;
 use super::format::{Format, RecordingPath, RunReading};
 
 /// All formats.
-pub static FORMATS: &[&Format] = &[
-    // Text.
-    &CSV, // Read by libraries that the workshop links.
-    &PARQUET, &MCAP,
-];
+pub static FORMATS: &[&Format] = &[&CSV, &PARQUET, &MCAP];
 
 /// Rows of text, in the layout that the dataset declares; also of files with an unknown extension.
 pub static CSV: Format = Format::of_text("CSV", "csv", Ok);
