@@ -113,6 +113,15 @@ pub struct TrainColumn {
     pub rows: Vec<f64>,
 }
 
+/// Returns the place of a train among those that are known, to which a new one is added.
+pub fn place_of(train: &str, trains: &mut Vec<String>) -> usize {
+    let known = trains.iter().position(|it| it == train);
+    known.unwrap_or_else(|| {
+        trains.push(train.to_owned());
+        trains.len() - 1
+    })
+}
+
 impl TrainColumn {
     /// Returns the name of each row's train, empty where none is named.
     pub fn cells(&self) -> impl Iterator<Item = &str> {

@@ -7,6 +7,7 @@ use std::fs::File;
 use std::path::Path;
 
 use bytes::Bytes;
+use dynocar_dataset::format::place_of;
 use dynocar_dataset::text_layout::TrainRows;
 use dynocar_dataset::trains::names_trains;
 use dynocar_dataset::{ColumnMapping, RunColumn, RunColumns, TrainColumn};
@@ -159,12 +160,7 @@ fn trains(file: &ParquetFile, column: &FileColumn) -> Result<Option<TrainColumn>
         if cell.is_empty() {
             return f64::NAN;
         }
-        let known = trains.iter().position(|it| it == cell);
-        let place = known.unwrap_or_else(|| {
-            trains.push(cell.to_owned());
-            trains.len() - 1
-        });
-        place as f64
+        place_of(cell, &mut trains) as f64
     };
     let mut is_text = true;
     let is_signed = column.is(CellKind::Integer { is_signed: true });

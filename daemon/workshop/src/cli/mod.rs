@@ -1,5 +1,5 @@
-//! The commands of the workshop, one file each; `check`, `explain`, `fmu` and `identify` serve other callers, too. Users call
-//! them through `dynocar`.
+//! The commands of the workshop, one file each, but `verify`, which is [`crate::verify`]; `check`, `explain`, `fmu` and
+//! `identify` serve other callers, too. Users call them through `dynocar`.
 
 pub mod brakes;
 pub mod check;
@@ -16,7 +16,6 @@ mod stops;
 mod survey;
 mod threads;
 mod train_text;
-mod verify;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -30,6 +29,7 @@ use dynocar::cli::{Failure, parse};
 use dynocar::output::{print, report_line, require_folder, write_in_folder};
 
 use crate::dataset::load;
+use crate::verify::{self, VerifyArguments};
 
 /// Dynocar, a dynamometer car in software: the workshop, which `dynocar` calls.
 #[derive(Debug, Parser)]
@@ -53,7 +53,7 @@ enum Command {
     Learn(learn::LearnArguments),
     Convert(convert::ConvertArguments),
     #[command(hide = true)]
-    Verify(verify::VerifyArguments),
+    Verify(VerifyArguments),
     #[command(hide = true)]
     Play(ReplayArguments),
     Completions(CompletionsArguments),

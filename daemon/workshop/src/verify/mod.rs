@@ -1,5 +1,5 @@
-//! Repeated computation of every recorded snapshot from the recorded samples, with the recorded configuration or
-//! another one, and with the code of the daemon's own pipelines.
+//! `dynocar replay --verify`: repeated computation of every recorded snapshot from the recorded samples, with the
+//! recorded configuration or another one, and with the code of the daemon's own pipelines.
 //!
 //! A pipeline is a function of its samples from the daemon's start on. A snapshot's `sequence` counts these samples,
 //! and so shows whether the recording holds them all.
@@ -8,8 +8,12 @@ mod pipelines;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
+use std::path::PathBuf;
 
+use clap::Args;
+use dynocar::cli::Failure;
 use dynocar::config::{ConfigError, DaemonConfig};
+use dynocar::output::{print, report_line};
 use dynocar::pipelines::build_pipeline;
 use dynocar_mcap::recording::Recording;
 use dynocar_mcap::writing::{CONFIGURATION, folder_of_configuration};
@@ -19,10 +23,61 @@ use dynocar_shared::{
 };
 use toml::{Table, Value};
 
+use crate::formats;
+
 pub use pipelines::{ComparisonOutcome, SnapshotDifference, Verified, verify};
 
 /// Fields of a snapshot that are stamps of the daemon's clock and are not computed from samples.
 pub const STAMPS: [&str; 3] = ["epoch", "published_ns", "vouched_ns"];
+
+/// Compute every recorded snapshot again.
+#[derive(Debug, Args)]
+pub struct VerifyArguments {
+    /// The recording; of one that rotated, its files in order
+    #[arg(required = true)]
+    recording: Vec<PathBuf>,
+    /// Also print the estimates that this configuration of the daemon would have given
+    #[arg(long, value_name = "FILE")]
+    with: Option<PathBuf>,
+}
+
+/// Computes every snapshot of a recording again, and reports the comparison.
+///
+/// # Errors
+///
+/// When the recording holds no snapshots or no configuration, or a computed snapshot differs.
+pub fn execute(arguments: &VerifyArguments) -> Result<(), Failure> {
+    let VerifyArguments { recording: paths, with } = arguments;
+    let recording = &(formats::of_recording(paths).whole)(paths).map_err(Failure::Input)?;
+    let path = &paths[0];
+    if let Some(broken) = &recording.broken {
+        report_line(&format!("dynocar: {broken}"));
+    }
+    if recording.snapshots.is_empty() {
+        let words = "no snapshots: nothing to verify";
+        return Err(Failure::Input(format!("{}: {words}", path.display())));
+    }
+    let configurations = Configurations::from_recording(recording);
+    let configurations =
+        configurations.map_err(|it| Failure::Input(format!("{}: {it}", path.display())))?;
+    let other = with.as_deref().map(DaemonConfig::load).transpose()?;
+    let verified = verify(recording, &configurations);
+    let (samples, snapshots) = (recording.samples.len(), recording.snapshots.len());
+    let names = paths.iter().map(|it| it.display().to_string()).collect::<Vec<_>>();
+    let names = names.join(", ");
+    print(&format!("{names}: {samples} samples, {snapshots} snapshots\n"))?;
+    print(&text(&verified))?;
+    if let (Some(other), Some(file)) = (&other, with) {
+        let newest = verified.last().map_or(0, |it| it.epoch);
+        let recorded = configurations.of_epoch(newest).0;
+        print(&overlay([recorded, other], &recording.samples, &file.display().to_string()))?;
+    }
+    if verified.iter().all(|it| it.outcome == ComparisonOutcome::Same) {
+        Ok(())
+    } else {
+        Err(Failure::Verdict(1))
+    }
+}
 
 /// Returns the answer for people.
 pub fn text(verified: &[Verified]) -> String {
