@@ -17,8 +17,7 @@ use num_bigint::BigInt;
 use parquet::data_type::FixedLenByteArray;
 
 use crate::column_type::CellKind;
-use crate::file::{ColumnReader, FileColumn, ParquetFile, damaged};
-use crate::file::{TableProblem, guarded};
+use crate::file::{ColumnReader, FileColumn, ParquetFile, TableProblem, damaged, guarded};
 
 /// Returns all columns of a Parquet file, with the numbers in the mapped ones: a missing value is `NaN`, true is 1 and
 /// false 0. Where a mapped column is not there, no column has numbers. The train of each row comes with them, where a

@@ -13,8 +13,9 @@ use dynocar_mcap::recording::{Metadata, Recording};
 use dynocar_mcap::writing::{McapError, RecordingWriter};
 use parquet::data_type::ByteArray;
 
-use crate::file::{ColumnReader, FileColumn, ParquetFile, damaged};
-use crate::file::{ParquetFileError, TableProblem, guarded};
+use crate::file::{
+    ColumnReader, FileColumn, ParquetFile, ParquetFileError, TableProblem, damaged, guarded,
+};
 use crate::table::{
     ATTACHMENTS, KIND, LAYOUT, METADATA, TABLES, TableKind, attachment_columns, metadata_columns,
 };

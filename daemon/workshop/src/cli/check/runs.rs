@@ -9,10 +9,10 @@ use dynocar::cli::text::{TextTable, WIDTH, short, wrap};
 use dynocar::config::DaemonConfig;
 use dynocar::dataset::FileKind;
 use dynocar::output::{report_line, write_in_folder};
-use dynocar_analysis::dataset::dataset_diagnostic;
 use dynocar_analysis::dataset::quality::{QuantityCount, ReasonCount};
 use dynocar_analysis::dataset::{
-    DatasetDiagnostic, DatasetError, Manifest, Phases, Quantity, Role, Run, RunQuality, formats,
+    DatasetDiagnostic, DatasetError, Manifest, Phases, Quantity, Role, Run, RunQuality,
+    dataset_diagnostic, formats,
 };
 use dynocar_analysis::explain::report::residual_line::AlongLine;
 use dynocar_core::plausibility::InputFault;
