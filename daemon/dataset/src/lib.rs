@@ -60,8 +60,7 @@ mod tests;
 
 pub use clock::TimeFormat;
 pub use dataset_diagnostic::DatasetDiagnostic;
-pub use dataset_diagnostic::unusual_resistance;
-pub use diagnostic::Diagnostic;
+pub use diagnostic::{Diagnostic, unusual_resistance};
 pub use document::top_keys;
 pub use error::{DatasetError, FileProblem, SourcePosition};
 pub use forces::{ForceSource, is_stamped_late, stamped_late};
