@@ -14,7 +14,7 @@
 //! - [`manifest`], [`train_file`], [`track_file`]: the three TOML files
 //! - [`quantity`]: quantities of columns, in their [`units`](dynocar_model::units)
 //! - [`text_layout`], [`clock`]: the division of text into cells, and times that are no numbers
-//! - [`formats`], [`format`](mod@format): the formats of recorded runs, and the contents of a run's file, text or columns
+//! - [`formats`], [`format`](mod@format): the formats of recorded runs; contents of a run's file, text or columns
 //! - `lines`, `header`, `cell`, `table`: a CSV file as columns of numbers
 //! - [`trains`]: files that hold several trains
 //! - `clock_faults`: times with an hour of summer time, seconds without a fraction, rows in another order

@@ -1,7 +1,7 @@
 //! The tables of a recording: names, metadata and columns.
 //!
-//! Beside Parquet's own schema stands Arrow's, which programs that use Arrow leave in a Parquet file. It states facts that
-//! Parquet cannot state: that numbers are times, and the units and meanings of columns.
+//! Programs that use Arrow leave Arrow's schema in a Parquet file, and so do these tables. It states facts that Parquet
+//! cannot state: that numbers are times, and the units and meanings of columns.
 
 use std::sync::{Arc, LazyLock};
 
