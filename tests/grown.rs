@@ -131,6 +131,23 @@ fn the_pipeline_identifies_the_mass() {
 }
 
 #[test]
+fn a_run_in_the_format_is_read_as_the_same_run_in_csv() {
+    let manifest = "[dataset]\nname = \"fixed\"\n[train]\nfile = \"train.toml\"\n[columns]\n\
+                    time = { column = \"t\", unit = \"s\" }\nspeed = { column = \"v\", unit = \"m/s\" }\n\
+                    [[runs]]\nfile = \"run.fwf\"\n";
+    let load = |manifest: &str, file: &str, text: &str| {
+        let files = [("dataset.toml", manifest), ("train.toml", TRAIN), (file, text)];
+        Dataset::load(&files[..]).map(|it| it.runs[0].samples.clone())
+    };
+    let read = load(manifest, "run.fwf", "  t    v\n0.0  3.5\n0.5 12.25\n1.0 12.5\n").unwrap();
+    let as_csv = manifest.replace("run.fwf", "run.csv");
+    assert_eq!(load(&as_csv, "run.csv", "t,v\n0,3.5\n0.5,12.25\n1,12.5\n"), Ok(read.clone()));
+    assert_eq!(read[1].speed_mps, 12.25);
+    let wrong = load(manifest, "run.fwf", "t v\n0 1\n1 fast\n").unwrap_err().to_string();
+    assert!(wrong.starts_with("run.fwf:3: column 'v'"), "{wrong}");
+}
+
+#[test]
 fn the_field_comes_from_a_column_and_acts() {
     let sample = dataset().runs[0].samples[0];
     let field = SampleField::ALL.into_iter().find(|it| it.name() == "headwind_mps").unwrap();

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use dynocar_dataset::text_layout::decoded;
 use dynocar_dataset::{
     Dataset, DatasetError, DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE, Manifest,
-    RunContent, is_parquet, parse_track, parse_train, top_keys,
+    RunContent, formats, parse_track, parse_train, top_keys,
 };
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
@@ -44,11 +44,6 @@ impl SourceArguments {
     pub fn source(&self) -> DatasetSource<'_> {
         DatasetSource { path: &self.dataset, train: self.train.map(TrainId) }
     }
-}
-
-/// Returns true for the name of a file, or a folder of files, of Parquet.
-pub fn is_parquet_path(path: &Path) -> bool {
-    path.extension().is_some_and(|it| it == "parquet")
 }
 
 /// Why a path leads to no dataset.
@@ -143,12 +138,12 @@ impl DatasetFiles for DatasetFolder {
     }
 
     fn read_run(&self, path: &str, manifest: &Manifest) -> Result<RunContent, FileProblem> {
-        let file = self.path_of(path);
-        if is_parquet(path) {
-            return Err(FileProblem::Table("it is Parquet, which the workshop reads".into()));
+        let (format, encoding) = (formats::of_run(path), manifest.layout.encoding);
+        if format.needs_library() {
+            return Err(format.is_not_text());
         }
-        let encoding = manifest.layout.encoding;
-        decoded(read_bytes(&file, encoding)?, encoding).map(RunContent::Text)
+        let text = decoded(read_bytes(&self.path_of(path), encoding)?, encoding)?;
+        format.rows(text).map(RunContent::Text)
     }
 
     fn label(&self, path: &str) -> String {

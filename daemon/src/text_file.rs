@@ -6,6 +6,7 @@ use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
 
 use dynocar_dataset::FileProblem;
+use dynocar_dataset::formats::FORMATS;
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
 /// A longer file is refused instead of filling the memory.
@@ -31,12 +32,7 @@ fn other_format(head: &[u8], encoding: &'static Encoding) -> Option<&'static str
     if [UTF_16LE, UTF_16BE].contains(&encoding) {
         return None;
     }
-    let begins: [(&[u8], &'static str); 16] = [
-        (b"PAR1", "a Parquet file: give it a name that ends with .parquet"),
-        (
-            b"\x89MCAP0",
-            "an MCAP recording: dynocar check reads it as it is, under a name that ends with .mcap",
-        ),
+    let begins: [(&[u8], &'static str); 14] = [
         (b"MDF     ", "an MF4 or MDF file: export it, as asammdf does with export(\"csv\")"),
         (b"TDSm", "a TDMS file: export it, as npTDMS does with as_dataframe().to_csv()"),
         (b"\x89HDF\r\n", "an HDF5 or MATLAB 7.3 file: export its columns as CSV or Parquet"),
@@ -55,7 +51,8 @@ fn other_format(head: &[u8], encoding: &'static Encoding) -> Option<&'static str
         (&[0xff, 0xfe], UTF_16),
         (&[0xfe, 0xff], UTF_16),
     ];
-    let known = begins.into_iter().find(|(mark, _)| head.starts_with(mark)).map(|(_, name)| name);
+    let mut known = FORMATS.iter().filter_map(|it| it.mark).chain(begins);
+    let known = known.find(|(mark, _)| head.starts_with(mark)).map(|(_, name)| name);
     known.or_else(|| match head.iter().position(|&byte| byte == 0) {
         Some(0) => Some("binary data"),
         // Every other byte of letters and digits.

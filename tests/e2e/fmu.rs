@@ -131,7 +131,7 @@ fn every_output_has_the_bits_of_the_pipelines_at_every_moment_looked_at() {
     for run in 1..=dataset.runs.len() {
         let name = format!("inputs/run_{run:02}.csv");
         let text = read_to_string(site.path().join(name)).unwrap();
-        assert!(text.starts_with(dynocar_workshop::fmu::INPUTS_MARK));
+        assert!(text.starts_with(dynocar_workshop::cli::fmu::INPUTS_MARK));
         let mut lines = text.lines();
         let header: Vec<&str> = lines.next().unwrap().split(',').collect();
         let rows: Vec<&str> = lines.collect();
@@ -280,8 +280,9 @@ fn a_library_that_is_not_there_or_another_is_refused_in_words() {
     };
     refusal("nowhere.so", "nowhere.so: cannot be read: No such file");
     refusal("other.so", "other.so: expected the libdynocar_fmu.so of this release");
-    let error =
-        dynocar_workshop::fmu::find_library(Path::new("/nowhere/dynocar")).unwrap_err().to_string();
+    let error = dynocar_workshop::cli::fmu::find_library(Path::new("/nowhere/dynocar"))
+        .unwrap_err()
+        .to_string();
     assert!(error.starts_with("no libdynocar_fmu.so of this release in /nowhere/deps"), "{error}");
     assert!(error.contains("`cargo build --release -p dynocar-fmu`"), "{error}");
 }

@@ -48,7 +48,7 @@ const CALLS: [(&str, &str); 17] = [
 /// Whole files whose sentences are messages: of impossible data and declarations, of stops.
 const SENTENCES: [&str; 3] = [
     "daemon/core/src/plausibility/input_fault.rs",
-    "daemon/dataset/src/declared.rs",
+    "daemon/dataset/src/dataset_diagnostic.rs",
     "shared/src/stopping.rs",
 ];
 /// Messages that name the remedy themselves, as the page would show them.

@@ -9,7 +9,7 @@ use dynocar_tests::simulator::{
     EffectRequest, GnssReceiver, SimulatedDataset, SimulatorSettings, TrainType, TrueEffect,
     simulate,
 };
-use dynocar_workshop::survey::answer::SurveyAnswer;
+use dynocar_workshop::survey::SurveyAnswer;
 use dynocar_workshop::survey::survey_folder;
 
 /// A regional railway of about 30 km: six runs to fit and two held out, each over the whole line.

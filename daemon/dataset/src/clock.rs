@@ -5,12 +5,12 @@
 
 use std::borrow::Cow;
 
-use packed::PACKED_CLOCK;
-pub(super) use packed::Packed;
 use time::format_description::{self, OwnedFormatItem};
 use time::parsing::Parsed;
 use time::{Date, Time};
 
+/// Hours, minutes and seconds as digits.
+pub(super) const PACKED_CLOCK: &str = "%H%M%S";
 const DAY_S: f64 = 86_400.0;
 /// 1970-01-01 as a Julian day.
 const UNIX_DAY: i64 = 2_440_588;
@@ -372,6 +372,5 @@ pub(super) fn unix_s(at: &toml::value::Datetime) -> Option<i64> {
     Some((i64::from(day.to_julian_day()) - UNIX_DAY) * 86_400 + second - 60 * zone_min)
 }
 
-mod packed;
 #[cfg(test)]
 mod tests;

@@ -5,8 +5,7 @@ use dynocar_core::plausibility::{DetectedFault, DetectedFaults, InputFault};
 use dynocar_model::train::PowerTrain;
 use toml::Value;
 
-use super::declared::implausible_columns;
-use super::diagnostic::{Diagnostic, read_as};
+use super::diagnostic::{Diagnostic, implausible_columns, read_as};
 use super::forces::{Force, ForceSource};
 use super::keys::run::DIRECTION;
 use super::order::quantile;

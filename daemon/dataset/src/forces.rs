@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::order::{TimeOrder, quantile};
 use super::quantity::Quantity;
-use super::spikes::spikes;
+use super::speed_and_position::spikes;
 use super::table::Table;
 
 /// Share of the greatest force by which a force may lie below zero as noise.

@@ -14,13 +14,12 @@
 //! - [`manifest`], [`train_file`], [`track_file`]: the three TOML files
 //! - [`quantity`]: quantities of columns, in their [`units`](dynocar_model::units)
 //! - [`text_layout`], [`clock`]: the division of text into cells, and times that are no numbers
-//! - `run_content`: contents of a run's file, text or columns
+//! - [`formats`], [`format`](mod@format): the formats of recorded runs; contents of a run's file, text or columns
 //! - `lines`, `header`, `cell`, `table`: a CSV file as columns of numbers
 //! - [`trains`]: files that hold several trains
 //! - `clock_faults`: times with an hour of summer time, seconds without a fraction, rows in another order
-//! - `order`, `spikes`, `motion`, `forces`, `altitude`: from columns to time, speed,
-//!   position, forces and gradient
-//! - `resolved`, [`run`], [`quality`], [`diagnostic`], [`dataset_diagnostic`], `diagnosing`, `declared`: samples,
+//! - `order`, `speed_and_position`, `forces`, `altitude`: from columns to time, speed, position, forces and gradient
+//! - `resolved`, [`run`], [`quality`], [`diagnostic`], [`dataset_diagnostic`], `diagnosing`: samples,
 //!   counts and warnings
 //! - [`written`]: writers of the three TOML files, and of changes in declared ones
 //! - [`guess`]: a description of files that nobody has described yet
@@ -31,12 +30,13 @@ pub mod clock;
 mod clock_faults;
 mod corrections;
 pub mod dataset_diagnostic;
-mod declared;
 mod diagnosing;
 pub mod diagnostic;
 pub mod document;
 pub mod error;
 mod forces;
+pub mod format;
+pub mod formats;
 pub mod guess;
 pub mod keys;
 mod lines;
@@ -47,15 +47,12 @@ pub mod quality;
 pub mod quantity;
 mod resolved;
 pub mod run;
-mod run_content;
 mod speed_and_position;
-mod spikes;
 mod table;
 pub mod text_layout;
 pub mod track_file;
 pub mod train_file;
 pub mod trains;
-mod unusual_resistance;
 pub mod written;
 
 #[cfg(test)]
@@ -63,23 +60,22 @@ mod tests;
 
 pub use clock::TimeFormat;
 pub use dataset_diagnostic::DatasetDiagnostic;
-pub use diagnostic::Diagnostic;
+pub use diagnostic::{Diagnostic, unusual_resistance};
 pub use document::top_keys;
 pub use error::{DatasetError, FileProblem, SourcePosition};
 pub use forces::{ForceSource, is_stamped_late, stamped_late};
+pub use format::{RunColumn, RunColumns, RunContent, TrainColumn};
 pub use manifest::{ColumnMapping, FileEntry, Manifest, PositionReference, Role, RunEntry};
 pub use order::OrderCounts;
 pub use quality::{Phases, RunQuality};
 pub use quantity::Quantity;
 pub use resolved::{DATASET_TRAIN, GradientSource};
-pub use run::{EXTRAS, QuantitySeries, Run, is_parquet, recorded_unix_s};
-pub use run_content::{RunColumn, RunColumns, RunContent, TrainColumn};
+pub use run::{EXTRAS, QuantitySeries, Run, recorded_unix_s};
 pub use speed_and_position::PositionSource;
 pub use table::LineCounts;
 pub use text_layout::TextLayout;
 pub use track_file::parse_track;
 pub use train_file::parse_train;
-pub use unusual_resistance::unusual_resistance;
 
 use std::sync::Arc;
 
@@ -121,6 +117,10 @@ impl DatasetFiles for [(&str, &str)] {
     fn read(&self, path: &str) -> Result<String, FileProblem> {
         let file = self.iter().find(|(name, _)| *name == path);
         file.map(|(_, text)| (*text).into()).ok_or(FileProblem::Missing)
+    }
+
+    fn read_run(&self, path: &str, _manifest: &Manifest) -> Result<RunContent, FileProblem> {
+        formats::of_run(path).rows(self.read(path)?).map(RunContent::Text)
     }
 }
 

@@ -13,11 +13,12 @@ use super::diagnostic::{Diagnostic, read_as};
 use super::error::{DatasetError, SourcePosition};
 
 use super::forces::{self, ForceSource};
+use super::format::{RunColumns, RunContent};
+use super::formats;
 use super::manifest::{Manifest, Role, RunEntry};
 use super::quality::{self, Judge, RunQuality};
 use super::quantity::Quantity;
 use super::resolved::{Context, GradientSource, Resolved};
-use super::run_content::{RunColumns, RunContent};
 use super::speed_and_position::PositionSource;
 use super::table::Table;
 use super::text_layout::TrainRows;
@@ -299,8 +300,9 @@ pub fn recorded_unix_s(
     }
     let text = beginning()?;
     // A row that breaks off may break off within a letter.
-    let whole = &text[..=text.rfind('\n')?];
-    let table = Table::parse("", whole, (&manifest.layout, &manifest.columns)).ok()?;
+    let whole = text[..=text.rfind('\n')?].to_owned();
+    let rows = formats::of_run(&entry.file).rows(whole).ok()?;
+    let table = Table::parse("", &rows, (&manifest.layout, &manifest.columns)).ok()?;
     let mut times_s = table.column(Quantity::Time)?.iter().copied();
     recorded(manifest, entry, table.first_day, times_s.find(|time_s| !time_s.is_nan())?)
 }
@@ -308,7 +310,7 @@ pub fn recorded_unix_s(
 /// Returns whether a run's times are those of a day.
 fn counts_from_midnight(manifest: &Manifest, entry: &RunEntry) -> bool {
     let has_format = manifest.mapping(Quantity::Time).is_some_and(|it| it.format.is_some());
-    has_format && !is_parquet(&entry.file)
+    has_format && !formats::of_run(&entry.file).needs_library()
 }
 
 /// Returns the time of a run's recording, whose first time is a number of seconds, on this day.
@@ -335,9 +337,4 @@ fn extras(table: &Table) -> Vec<(Quantity, QuantitySeries)> {
         Some((quantity, values.iter().map(held).collect()))
     };
     EXTRAS.into_iter().filter_map(extra).collect()
-}
-
-/// Returns true for the name of a Parquet file, which a run may be in place of CSV.
-pub fn is_parquet(path: &str) -> bool {
-    path.ends_with(".parquet")
 }

@@ -5,10 +5,10 @@ use dynocar_model::units::{Dimension, Unit};
 use super::cell::{held, is_word, lossy, not_a_value, parse_cell, truth};
 use super::clock::DayClock;
 use super::error::{DatasetError, NO_HEADER, NO_ROWS, SourcePosition};
+use super::format::RunColumn;
 use super::lines::{CellRow, RowReader, below, find_columns, names_of};
 use super::manifest::ColumnMapping;
 use super::quantity::Quantity;
-use super::run_content::RunColumn;
 use super::text_layout::TextLayout;
 
 /// Number of rows from which the number of all rows is estimated.

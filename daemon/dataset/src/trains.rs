@@ -4,9 +4,9 @@ use std::borrow::Cow;
 
 use super::cell::truth;
 use super::error::{DatasetError, SourcePosition};
+use super::format::{TrainColumn, place_of};
 use super::lines::{CellRow, RowReader, below};
 use super::quantity::Quantity;
-use super::run_content::TrainColumn;
 use super::table::Table;
 use super::text_layout::TextLayout;
 
@@ -44,11 +44,7 @@ impl TrainCells {
         if cell.is_empty() {
             return;
         }
-        let known = self.trains.iter().position(|it| it == cell);
-        let place = known.unwrap_or_else(|| {
-            self.trains.push(cell.to_owned());
-            self.trains.len() - 1
-        });
+        let place = place_of(cell, &mut self.trains);
         if self.before.replace(place).is_some_and(|it| it != place) {
             self.changes.push(line);
         }

@@ -8,8 +8,7 @@ use std::sync::LazyLock;
 use dynocar_shared::schema::{Field, Missing, unit_of};
 use dynocar_shared::{Parameter, ParameterSnapshot, RejectionReason, TrainSample};
 
-use crate::event::Event;
-use crate::message::MessageField;
+use crate::event::{Event, MessageField};
 use crate::schema::{
     SAMPLE_FIELDS, SNAPSHOT_FIELDS, SUFFIXES, members_of, suffixed_name, vocabulary_of,
     vocabulary_of_type,

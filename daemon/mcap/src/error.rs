@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use dynocar::cli::Failure;
 
-use crate::codec::CodecError;
 use crate::schema::SAMPLE;
+use crate::topic::CodecError;
 
 /// An error of a file or a folder, with its path.
 #[derive(Debug, thiserror::Error)]

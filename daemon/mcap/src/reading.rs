@@ -11,10 +11,10 @@ use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOp
 use mcap::{McapError, parse_record};
 use prost::Message;
 
-use crate::codec::{decode_sample, decode_snapshot};
 use crate::error::{CopyError, ReadError, ReadProblem};
 use crate::event::Event;
 use crate::schema::{EVENT, SAMPLE, SNAPSHOT, is_described_alike};
+use crate::topic::{decode_sample, decode_snapshot};
 
 /// How a file ends.
 #[derive(Clone, Debug, PartialEq)]

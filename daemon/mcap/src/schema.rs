@@ -16,8 +16,7 @@ use prost_types::{
     FileDescriptorProto, FileDescriptorSet, OneofDescriptorProto,
 };
 
-use crate::event::{Event, EventKind};
-use crate::message::MessageField;
+use crate::event::{Event, EventKind, MessageField};
 
 /// Name of the message of a sample.
 pub const SAMPLE: &str = "dynocar.TrainSample";

@@ -4,7 +4,7 @@
 use parquet::basic::{ConvertedType, LogicalType, TimeUnit, Type as PhysicalType};
 use parquet::schema::types::Type;
 
-use crate::arrow_schema::Hint;
+use crate::table::Hint;
 
 /// Kind of a column's cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,15 +7,17 @@ use std::fs::File;
 use std::path::Path;
 
 use bytes::Bytes;
+use dynocar_dataset::format::place_of;
 use dynocar_dataset::text_layout::TrainRows;
 use dynocar_dataset::trains::names_trains;
 use dynocar_dataset::{ColumnMapping, RunColumn, RunColumns, TrainColumn};
 use dynocar_model::units::{Dimension, Unit};
+use half::f16;
+use num_bigint::BigInt;
 use parquet::data_type::FixedLenByteArray;
 
 use crate::column_type::CellKind;
-use crate::error::{TableProblem, guarded};
-use crate::file::{ColumnReader, FileColumn, ParquetFile, damaged};
+use crate::file::{ColumnReader, FileColumn, ParquetFile, TableProblem, damaged, guarded};
 
 /// Returns all columns of a Parquet file, with the numbers in the mapped ones: a missing value is `NaN`, true is 1 and
 /// false 0. Where a mapped column is not there, no column has numbers. The train of each row comes with them, where a
@@ -105,8 +107,8 @@ fn numbers(file: &ParquetFile, column: &FileColumn, unit: &Unit) -> Result<Vec<f
     let of_short =
         |count: i32| of_count(if is_signed { count.into() } else { count.cast_unsigned().into() });
     let of_bytes = |bytes: &[u8]| match (kind, bytes) {
-        (CellKind::Decimal { scale }, _) => decimal(digits(bytes), scale),
-        (_, &[low, high]) => as_written(half(u16::from_le_bytes([low, high]))),
+        (CellKind::Decimal { scale }, _) => decimal(BigInt::from_signed_bytes_be(bytes), scale),
+        (_, &[low, high]) => as_written(f16::from_le_bytes([low, high])),
         _ => f64::NAN,
     };
     file.read(column, |part| {
@@ -142,41 +144,6 @@ fn decimal(count: impl Display, scale: i32) -> f64 {
     as_written(format_args!("{count}e{}", -i64::from(scale)))
 }
 
-/// Returns the digits of a whole number of any size, whose first byte is the highest and bears the sign.
-fn digits(bytes: &[u8]) -> String {
-    let is_negative = bytes.first().is_some_and(|it| *it >= 128);
-    let mut left: Vec<u8> = bytes.to_vec();
-    if is_negative {
-        let mut carry = true;
-        for it in left.iter_mut().rev() {
-            (*it, carry) = (!*it).overflowing_add(carry.into());
-        }
-    }
-    let mut digits = Vec::new();
-    while left.iter().any(|it| *it != 0) {
-        let mut rest = 0;
-        for it in &mut left {
-            let all = rest * 256 + u16::from(*it);
-            (*it, rest) = ((all / 10) as u8, all % 10);
-        }
-        digits.push(char::from(b'0' + rest as u8));
-    }
-    let sign = if is_negative { "-" } else { "0" };
-    sign.chars().chain(digits.into_iter().rev()).collect()
-}
-
-/// Returns the number in floating point of 16 bits.
-fn half(bits: u16) -> f32 {
-    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f32::from(bits & 1023));
-    let size = match exponent {
-        0 => fraction * 2f32.powi(-24),
-        31 if fraction == 0.0 => f32::INFINITY,
-        31 => f32::NAN,
-        _ => (1024.0 + fraction) * 2f32.powi(exponent - 25),
-    };
-    if bits >> 15 == 0 { size } else { -size }
-}
-
 /// Returns a time in s; by its text it is the nearest number.
 fn time_s(count: i64, per_second: u64) -> f64 {
     let (sign, count) = (if count < 0 { "-" } else { "" }, count.unsigned_abs());
@@ -192,12 +159,7 @@ fn trains(file: &ParquetFile, column: &FileColumn) -> Result<Option<TrainColumn>
         if cell.is_empty() {
             return f64::NAN;
         }
-        let known = trains.iter().position(|it| it == cell);
-        let place = known.unwrap_or_else(|| {
-            trains.push(cell.to_owned());
-            trains.len() - 1
-        });
-        place as f64
+        place_of(cell, &mut trains) as f64
     };
     let mut is_text = true;
     let is_signed = column.is(CellKind::Integer { is_signed: true });
@@ -215,18 +177,17 @@ fn trains(file: &ParquetFile, column: &FileColumn) -> Result<Option<TrainColumn>
             };
         }
         match part.reader {
+            ColumnReader::Int32ColumnReader(it) if is_signed => {
+                each!(it, |it| place(&it.to_string()))
+            }
             ColumnReader::Int32ColumnReader(it) => {
-                each!(it, |it| place(
-                    &(if is_signed { (*it).into() } else { i64::from(it.cast_unsigned()) })
-                        .to_string()
-                ))
+                each!(it, |it| place(&it.cast_unsigned().to_string()))
+            }
+            ColumnReader::Int64ColumnReader(it) if is_signed => {
+                each!(it, |it| place(&it.to_string()))
             }
             ColumnReader::Int64ColumnReader(it) => {
-                each!(it, |it| place(&if is_signed {
-                    it.to_string()
-                } else {
-                    it.cast_unsigned().to_string()
-                }))
+                each!(it, |it| place(&it.cast_unsigned().to_string()))
             }
             ColumnReader::DoubleColumnReader(it) => {
                 each!(it, |it| if it.is_nan() { *it } else { place(&it.to_string()) })

@@ -6,10 +6,8 @@
 //!
 //! # Layout
 //!
-//! - [`table`]: the tables of a recording, after `dynocar_mcap::columns`
-//! - [`arrow_schema`]: Arrow's schema of a table, in addition to Parquet's
-//! - [`error`]: why a file cannot be read, and how a damaged file affects its library
-//! - [`column_type`], [`file`](mod@file): types of the columns of a file, and their cells
+//! - [`table`]: the tables of a recording, after `dynocar_mcap::columns`, with Arrow's schema in addition to Parquet's
+//! - [`column_type`], [`file`](mod@file): types of the columns of a file, their cells, and why a file cannot be read
 //! - [`columns`]: a Parquet file of any program as columns of numbers, and the train of each row
 //! - [`reading`]: Parquet to the messages of a recording, and to MCAP
 //! - [`table_file`], [`writing`]: MCAP to Parquet
@@ -34,10 +32,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod arrow_schema;
 pub mod column_type;
 pub mod columns;
-pub mod error;
 pub mod file;
 pub mod reading;
 pub mod table;

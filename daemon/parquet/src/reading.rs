@@ -5,16 +5,17 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-use dynocar::dataset::is_parquet_path;
 use dynocar::storage::{Disk, settle};
+use dynocar_dataset::formats::PARQUET;
 use dynocar_mcap::columns::{ColumnSource, RecordingColumn, RecordingRow};
 use dynocar_mcap::error::{ReadProblem, WriteError};
 use dynocar_mcap::recording::{Metadata, Recording};
 use dynocar_mcap::writing::{McapError, RecordingWriter};
 use parquet::data_type::ByteArray;
 
-use crate::error::{ParquetFileError, TableProblem, guarded};
-use crate::file::{ColumnReader, FileColumn, ParquetFile, damaged};
+use crate::file::{
+    ColumnReader, FileColumn, ParquetFile, ParquetFileError, TableProblem, damaged, guarded,
+};
 use crate::table::{
     ATTACHMENTS, KIND, LAYOUT, METADATA, TABLES, TableKind, attachment_columns, metadata_columns,
 };
@@ -74,7 +75,7 @@ fn files(path: &Path) -> Result<Vec<PathBuf>, ParquetFileError> {
         }
         let entries = std::fs::read_dir(path)?.map(|it| Ok(it?.path()));
         let mut files = entries.collect::<std::io::Result<Vec<PathBuf>>>()?;
-        files.retain(|it| is_parquet_path(it));
+        files.retain(|it| PARQUET.is_of(it));
         files.sort();
         if files.is_empty() { Err(TableProblem::NotOurs) } else { Ok(files) }
     };

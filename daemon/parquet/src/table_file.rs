@@ -12,8 +12,7 @@ use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 
-use crate::arrow_schema::encoded;
-use crate::table::file_schema;
+use crate::table::{encoded, file_schema};
 
 /// Cells of a column, row after row.
 #[derive(Clone, Debug, Default, PartialEq)]

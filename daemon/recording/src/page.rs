@@ -8,8 +8,7 @@ use dynocar_shared::{PipelineKind, Reason, Status};
 
 use dynocar_mcap::annotate::MESSAGES;
 use dynocar_mcap::columns::{ColumnSource, EVENTS, RecordingColumn, SAMPLES, SNAPSHOTS, STAMPS};
-use dynocar_mcap::event::{Event, EventKind};
-use dynocar_mcap::message::MessageField;
+use dynocar_mcap::event::{Event, EventKind, MessageField};
 use dynocar_mcap::schema::{SAMPLE_FIELDS, SNAPSHOT_FIELDS, SUFFIXES, scalar, vocabulary_of_type};
 
 const HEAD: &str = "# Fields of a recording

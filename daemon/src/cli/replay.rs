@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use dynocar_dataset::{Dataset, DatasetHead, Run, is_parquet};
+use dynocar_dataset::{Dataset, DatasetHead, Run, formats};
 use dynocar_shared::{PipelineKind, TrainId};
 use dynocar_transport::Host;
 
 use super::Failure;
 use super::failure::{Passed, become_it, words_of_command};
-use crate::dataset::{self, DatasetSource, LoadError, is_parquet_path};
+use crate::dataset::{self, DatasetSource, LoadError};
 use crate::output::{Redrawn, bar, can_draw, report_line};
 use crate::programs::WORKSHOP;
 use crate::replay::{Rate, ReplayReport, Replayer};
@@ -66,11 +66,13 @@ pub fn execute_or_become(arguments: &ReplayArguments) -> Result<(), Failure> {
     execute(arguments, |source| dataset::load(source))
 }
 
-/// Returns true for a recording, and for a dataset with runs in Parquet.
+/// Returns true for a recording, and for a dataset with runs that only a library reads.
 fn needs_workshop(path: &Path) -> bool {
-    let is_recording = path.extension().is_some_and(|it| it == "mcap") || is_parquet_path(path);
-    let has_parquet = |head: &DatasetHead| head.manifest.runs.iter().any(|it| is_parquet(&it.file));
-    is_recording || dataset::open(path).is_ok_and(|(_, head)| has_parquet(&head))
+    let needs_library = |head: &DatasetHead| {
+        head.manifest.runs.iter().any(|it| formats::of_run(&it.file).needs_library())
+    };
+    formats::of_recording(path).is_some()
+        || dataset::open(path).is_ok_and(|(_, head)| needs_library(&head))
 }
 
 /// Plays the runs of the dataset that a function reads.

@@ -7,9 +7,9 @@
 //!
 //! - [`brakes_page`]: the parameters of a brake as a page of HTML
 //! - [`cli`]: its commands, one file each
-//! - [`convert`], [`from_dataset`]: recordings to datasets, in memory or in a folder, and back
-//! - [`dataset`]: the dataset at a path, be it a folder or a recording
-//! - [`fmu`]: the estimators as an FMU
+//! - [`convert`]: recordings to datasets, in memory or in a folder
+//! - [`dataset`]: the dataset at a path, be it a folder or a recording; a dataset as a recording
+//! - [`formats`]: the libraries of the formats that are not text
 //! - [`learn`]: recorded runs into candidates for the store
 //! - [`updated`]: the model with its effects as train and track files, and a dataset of them
 //! - [`report`]: an explanation as a page of HTML
@@ -30,8 +30,7 @@ pub mod brakes_page;
 pub mod cli;
 pub mod convert;
 pub mod dataset;
-pub mod fmu;
-pub mod from_dataset;
+pub mod formats;
 pub mod learn;
 pub mod report;
 pub mod run_facts;

@@ -4,8 +4,7 @@ use dynocar_model::units::{Dimension, Unit, is_unit};
 
 use super::facts::{Facts, TextCell};
 use super::guessed::GuessedColumn;
-use super::name::{Name, readings, scaled_unit};
-use super::vocabulary::{TermWeight, VOCABULARY, listed, terms};
+use super::name::{Name, TermWeight, VOCABULARY, listed, readings, scaled_unit, terms};
 use crate::Quantity;
 use crate::error::nearest;
 

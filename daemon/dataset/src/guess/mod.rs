@@ -6,9 +6,8 @@
 //!
 //! # Layout, in the order of the work
 //!
-//! - `layout`, `columns`, `facts`: delimiter, decimal mark, names and units; facts on the values
-//! - `marks`: the marks in numbers
-//! - `name`, `vocabulary`: a name in words, units as people write them, recorders' names of the quantities
+//! - `layout`, `columns`, `facts`: delimiter, marks in numbers, names and units; facts on the values
+//! - `name`: a name in words, units as people write them, recorders' names of the quantities
 //! - `matching`, `plausible`: the score of a column for each quantity, and its likeliest unit
 //! - `assignment`: one column for each quantity
 //! - [`guessed`]: the guess, and its correction
@@ -18,11 +17,9 @@ mod columns;
 mod facts;
 pub mod guessed;
 mod layout;
-mod marks;
 mod matching;
 mod name;
 mod plausible;
-mod vocabulary;
 
 #[cfg(test)]
 mod tests;

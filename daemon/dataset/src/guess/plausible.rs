@@ -3,7 +3,7 @@
 use dynocar_model::units::Unit;
 
 use super::facts::Facts;
-use super::vocabulary::{Measure, Usual, usual};
+use super::name::{Measure, Usual, usual};
 use crate::Quantity;
 
 /// Factor beyond the usual values above which values are not of a quantity in a unit.

@@ -11,7 +11,7 @@ use arrow_array::{
 };
 use dynocar_analysis::dataset::text_layout::TrainRows;
 use dynocar_analysis::dataset::{
-    ColumnMapping, Dataset, DatasetFiles, FileProblem, MANIFEST_FILE, Manifest, is_parquet,
+    ColumnMapping, Dataset, DatasetFiles, FileProblem, MANIFEST_FILE, Manifest, formats,
 };
 use dynocar_dataset::{RunColumn, RunContent};
 use dynocar_model::units::{Dimension, Unit};
@@ -111,7 +111,7 @@ impl DatasetFiles for AsParquet {
     }
 
     fn read_run(&self, path: &str, manifest: &Manifest) -> Result<RunContent, FileProblem> {
-        assert!(is_parquet(path));
+        assert!(formats::PARQUET.is_of(path));
         let columns = columns_of(&self.tables.join(path), &manifest.columns, &TrainRows::All);
         Ok(RunContent::Columns(columns.unwrap()))
     }

@@ -8,18 +8,18 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use dynocar::storage::{SharedStorage, folder_of};
-use dynocar_mcap::writing::McapError;
+use dynocar_mcap::writing::{
+    CONFIGURATION, McapError, RecordingWriter, WallClock, folder_of_configuration,
+};
 use dynocar_shared::TrainId;
 use dynocar_transport::monotonic_now_ns;
 
-use super::configuration::Configuration;
 use super::housekeeping::{Housekeeper, Rotation, Task};
 use super::keeping::{self, EventKeeper};
 use super::ring::next;
-use super::{RecordError, Recorded};
+use super::{Configuration, RecordError, Recorded};
 use dynocar_mcap::event::{Event, EventKind};
 use dynocar_mcap::topic::Message;
-use dynocar_mcap::writing::{CONFIGURATION, RecordingWriter, WallClock, folder_of_configuration};
 
 /// A file, with the bytes that were handed to the system.
 struct Counted {

@@ -15,8 +15,7 @@ use dynocar::stamp::Stamp;
 use dynocar::storage::{SharedStorage, StorageError};
 use dynocar_shared::Status;
 
-use super::kept_event::{self, KeptEvent, Reason, beside, forget_unfinished, kept_bytes};
-use super::ring::Aged;
+use super::ring::{Aged, KeptEvent, Reason, beside, forget_unfinished, kept_bytes, newest_event};
 use dynocar_mcap::event::{Event, EventKind};
 
 /// Folder in the ring's folder for the kept files.
@@ -150,7 +149,7 @@ impl EventKeeper {
             TryLockError::Error(error) => refused(ring)(error),
         })?;
         forget_unfinished(&ring.join(KEPT_FOLDER));
-        let open = kept_event::newest(&ring.join(KEPT_FOLDER));
+        let open = newest_event(&ring.join(KEPT_FOLDER));
         // By its account, but never later than if it had begun now.
         let left_s = open.as_ref().map_or(0.0, |it| Stamp::now().seconds_to(&it.1.until()));
         let left = Duration::try_from_secs_f64(left_s).unwrap_or_default().min(keeping.after);

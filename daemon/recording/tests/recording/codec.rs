@@ -3,7 +3,7 @@
 use dynocar_shared::SampleField;
 use proptest::prelude::*;
 
-use dynocar_mcap::codec::{
+use dynocar_mcap::topic::{
     CodecError, decode_sample, decode_snapshot, encode_sample, encode_snapshot,
 };
 use dynocar_shared::layout::Words;

@@ -10,7 +10,7 @@ use dynocar_mcap::error::CopyError;
 use dynocar_mcap::reading::{ChannelInfo, Raw, RecordingItem, Visitor, read};
 use dynocar_mcap::recording::Recording;
 use dynocar_workshop::convert::{ModelFiles, to_dataset};
-use dynocar_workshop::from_dataset::from_dataset;
+use dynocar_workshop::dataset::from_dataset;
 use mcap::records::MessageHeader;
 use mcap::{Attachment, Compression, WriteOptions, Writer};
 

@@ -3,23 +3,23 @@
 mod json;
 mod report;
 mod runs;
-mod understood;
-
-pub use understood::Understood;
 
 use std::path::Path;
 use std::sync::Arc;
 
+use dynocar::cli::Failure;
 use dynocar::cli::check::{self as daemon_check, CheckArguments, or_refused};
+use dynocar::dataset::{DatasetSource, FileKind, LoadError, kind_of, labelled_text};
+use dynocar::output::{give, require_file, require_folder};
 use dynocar_analysis::dataset::{SourcePosition, parse_track, parse_train, top_keys};
 use dynocar_analysis::parallel;
 use dynocar_shared::TrainId;
 use serde::Serialize;
 
 use crate::dataset;
-use dynocar::cli::Failure;
-use dynocar::dataset::{DatasetSource, FileKind, LoadError, kind_of, labelled_text};
-use dynocar::output::{give, require_file, require_folder};
+use crate::formats::is_recording;
+
+pub use runs::Understood;
 
 /// Runs `dynocar check`.
 ///
@@ -38,7 +38,7 @@ pub fn run(arguments: &CheckArguments) -> Result<(), Failure> {
     let understood = or_refused(path, json, understand(source, SamplesOfRuns::Dropped))?;
     give(json, &understood.answer(path), || understood.text())?;
     if let Some(folder) = &arguments.draw {
-        understood::draw(&understood, folder)?;
+        runs::draw(&understood, folder)?;
     }
     let errors: Vec<_> = understood.errors().map(ToString::to_string).collect();
     if errors.is_empty() { Ok(()) } else { Err(Failure::Input(errors.join("\ndynocar: "))) }
@@ -72,7 +72,7 @@ pub enum SamplesOfRuns {
 /// When the path leads to no known kind of file, or a file that everything rests on is wrong.
 pub fn understand(source: DatasetSource, samples: SamplesOfRuns) -> Result<Understood, Failure> {
     let path = source.path;
-    if source.train.is_some() || !path.is_file() || dataset::is_recording(path) {
+    if source.train.is_some() || !path.is_file() || is_recording(path) {
         return read_dataset(source, samples);
     }
     let (label, text) = labelled_text(path)?;

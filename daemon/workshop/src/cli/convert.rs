@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use dynocar::cli::Failure;
-use dynocar::dataset::is_parquet_path;
 use dynocar::output::{report_line, require_new};
-use dynocar_parquet::reading::{ParquetContent, read, write_mcap};
-use dynocar_parquet::writing::{Written, write_folder};
+use dynocar_analysis::dataset::formats::MCAP;
+use dynocar_parquet::writing::Written;
 
-use crate::convert::{ModelFiles, Unpacked, to_dataset, unpack};
-use crate::from_dataset::from_dataset;
+use crate::convert::{ModelFiles, Unpacked, unpack};
+use crate::dataset::from_dataset;
+use crate::formats::{self, Exchange, is_recording};
 
 /// Convert recordings between MCAP, CSV datasets and Parquet.
 #[derive(Debug, Args)]
@@ -47,27 +47,32 @@ pub fn execute(arguments: &ConvertArguments) -> Result<(), Failure> {
     if let (Some(dataset), 2..) = (dataset, from.len()) {
         return Err(Failure::Input(format!("{}: expected no file beside", dataset.display())));
     }
-    let parquet = from.iter().find(|it| is_parquet_path(it));
+    let source = formats::of_recording(from);
     let shown = output.display();
     let files = ModelFiles { train: train_file.clone(), track: track_file.clone() };
-    let unpacked = match (dataset, parquet) {
-        (_, Some(it)) if is_parquet_path(output) => {
-            return Err(Failure::Input(format!("{}: it is Parquet already", it.display())));
+    let written_as = formats::of_extension(output);
+    if let Some((format, exchange)) =
+        written_as.and_then(|it| Some((it.format, it.exchange.as_ref()?)))
+    {
+        if let Some(own) = from.iter().find(|it| format.is_of(it)) {
+            let words = format!("{}: it is {} already", own.display(), format.name);
+            return Err(Failure::Input(words));
         }
-        _ if is_parquet_path(output) => return to_parquet(arguments, dataset),
+        return from_mcap(arguments, dataset, exchange);
+    }
+    let unpacked = match (dataset, &source.exchange) {
         (Some(dataset), _) => {
             let samples = from_dataset(dataset, output)?;
             return arguments.report(&format!("{shown}: {samples} samples"));
         }
-        (None, Some(_)) => {
-            let content = one(from)?;
-            if output.extension().is_some_and(|it| it == "mcap") {
-                write_mcap(&content, output).map_err(Failure::work)?;
-                return arguments.report(&format!("{shown}: {} messages", content.messages.len()));
-            }
-            unpack(&from[0], content.into_recording(), output, *train, &files)?
+        (None, Some(exchange)) if MCAP.is_of(output) => {
+            let messages = (exchange.to_mcap)(from, output)?;
+            return arguments.report(&format!("{shown}: {messages} messages"));
         }
-        (None, None) => to_dataset(from, output, *train, &files)?,
+        (None, _) => {
+            let recording = (source.samples)(from).map_err(Failure::Input)?;
+            unpack(&from[0], recording, output, *train, &files)?
+        }
     };
     let Unpacked { runs, samples, left_out, broken } = unpacked;
     report_broken(broken);
@@ -77,36 +82,24 @@ pub fn execute(arguments: &ConvertArguments) -> Result<(), Failure> {
 }
 
 fn is_dataset(path: &Path) -> bool {
-    match path.extension().and_then(|it| it.to_str()) {
-        Some("toml") => true,
-        Some("parquet") => false,
-        _ => path.is_dir(),
-    }
+    path.extension().is_some_and(|it| it == "toml") || path.is_dir() && !is_recording(path)
 }
 
-/// Returns the recording in Parquet, which is one path.
-///
-/// # Errors
-///
-/// When there are several, or it cannot be read.
-pub fn one(paths: &[PathBuf]) -> Result<ParquetContent, Failure> {
-    let [path] = paths else {
-        let words = "expected one recording in Parquet";
-        return Err(Failure::Input(format!("{}: {words}", paths[0].display())));
-    };
-    read(path).map_err(Failure::input)
-}
-
-fn to_parquet(arguments: &ConvertArguments, dataset: Option<&PathBuf>) -> Result<(), Failure> {
+/// Writes a recording in MCAP, or a dataset, in another format.
+fn from_mcap(
+    arguments: &ConvertArguments,
+    dataset: Option<&PathBuf>,
+    exchange: &Exchange,
+) -> Result<(), Failure> {
     let ConvertArguments { from, output, .. } = arguments;
     let written = match dataset {
-        None => write_folder(from, output),
+        None => (exchange.from_mcap)(from, output),
         Some(dataset) => {
             // A dataset first becomes the recording that a controller's samples would have given.
             let place = tempfile::tempdir().map_err(Failure::work)?;
             let recording = place.path().join("dataset.mcap");
             from_dataset(dataset, &recording)?;
-            write_folder(&[recording], output)
+            (exchange.from_mcap)(&[recording], output)
         }
     };
     let Written { samples, snapshots, events, left_out, broken } = written?;

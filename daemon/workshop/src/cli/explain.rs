@@ -17,7 +17,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 pub use super::explained::text;
 use super::explained_runs::ExplainedRuns;
 use super::threads::Threads;
-use crate::from_dataset::annotate;
+use crate::dataset::annotate;
 use crate::report;
 use crate::report::provenance::{Provenance, for_shell, own_command_line};
 use crate::updated::{UPDATED_FILES, UPDATED_MARK, UpdatedFiles, UpdatedModelError, write_updated};

@@ -1,6 +1,5 @@
 //! `dynocar identify`: the daemon's pipelines over recorded runs.
 
-mod answer;
 mod runs;
 
 use std::path::PathBuf;
@@ -18,8 +17,7 @@ use dynocar_model::units::Unit;
 use dynocar_shared::{HALF_95, Parameter, ParameterSnapshot, PipelineKind, schema};
 use serde::Serialize;
 
-use self::answer::EstimatorAnswer;
-use self::runs::{EstimatorSpread, RunAnswer};
+use self::runs::{EstimatorAnswer, EstimatorSpread, RunAnswer};
 use crate::dataset::{self, FilesOfDataset};
 use crate::run_facts::diagnostics;
 use dynocar::cli::Failure;

@@ -1,14 +1,13 @@
-//! The commands of the workshop, one file each; `check`, `explain` and `identify` serve other callers, too. Users call
-//! them through `dynocar`.
+//! The commands of the workshop, one file each, but `verify`, which is [`crate::verify`]; `check`, `explain`, `fmu` and
+//! `identify` serve other callers, too. Users call them through `dynocar`.
 
 pub mod brakes;
 pub mod check;
 mod convert;
-mod documents;
 pub mod explain;
 mod explained;
 pub mod explained_runs;
-mod fmu;
+pub mod fmu;
 pub mod identify;
 mod import;
 mod init;
@@ -17,17 +16,20 @@ mod stops;
 mod survey;
 mod threads;
 mod train_text;
-mod verify;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap_complete::Shell;
+use clap_mangen::Man;
 use dynocar::cli::check::CheckArguments;
 use dynocar::cli::replay::{self, ReplayArguments};
 use dynocar::cli::{Failure, parse};
+use dynocar::output::{print, report_line, require_folder, write_in_folder};
 
 use crate::dataset::load;
+use crate::verify::{self, VerifyArguments};
 
 /// Dynocar, a dynamometer car in software: the workshop, which `dynocar` calls.
 #[derive(Debug, Parser)]
@@ -51,11 +53,11 @@ enum Command {
     Learn(learn::LearnArguments),
     Convert(convert::ConvertArguments),
     #[command(hide = true)]
-    Verify(verify::VerifyArguments),
+    Verify(VerifyArguments),
     #[command(hide = true)]
     Play(ReplayArguments),
-    Completions(documents::CompletionsArguments),
-    Man(documents::ManArguments),
+    Completions(CompletionsArguments),
+    Man(ManArguments),
 }
 
 impl Command {
@@ -74,8 +76,8 @@ impl Command {
             Command::Convert(arguments) => convert::execute(arguments),
             Command::Verify(arguments) => verify::execute(arguments),
             Command::Play(arguments) => replay::execute(arguments, |source| load(source)),
-            Command::Completions(arguments) => documents::complete(arguments, all_commands()),
-            Command::Man(arguments) => documents::write_manual(arguments, all_commands()),
+            Command::Completions(arguments) => complete(arguments, all_commands()),
+            Command::Man(arguments) => write_manual(arguments, all_commands()),
         }
     }
 
@@ -129,4 +131,64 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report("dynocar", arguments.command.json()),
     }
+}
+
+/// Write the manual pages, one for every command.
+#[derive(Debug, Args)]
+struct ManArguments {
+    /// Write the pages into this folder, which is made where there is none
+    #[arg(long, value_name = "FOLDER")]
+    out: PathBuf,
+}
+
+/// Writes the manual pages of these commands.
+///
+/// # Errors
+///
+/// When a page cannot be written.
+fn write_manual(arguments: &ManArguments, commands: clap::Command) -> Result<(), Failure> {
+    require_folder(&arguments.out)?;
+    let pages = pages(commands)?;
+    for (name, page) in &pages {
+        write_in_folder(&arguments.out, name, page)?;
+    }
+    report_line(&format!("manual: {} pages in {}", pages.len(), arguments.out.display()));
+    Ok(())
+}
+
+/// Returns every page with its file's name: the program's first, then its commands' in their order.
+fn pages(commands: clap::Command) -> Result<Vec<(String, String)>, Failure> {
+    // `help` says nothing that the pages do not.
+    let mut commands = commands.disable_help_subcommand(true);
+    commands.build();
+    let own = std::iter::once(commands.clone());
+    own.chain(commands.get_subcommands().cloned()).map(page).collect()
+}
+
+fn page(command: clap::Command) -> Result<(String, String), Failure> {
+    let source = concat!("dynocar ", env!("CARGO_PKG_VERSION"));
+    let page = Man::new(command).source(source);
+    let name = page.get_filename();
+    let mut text = Vec::new();
+    page.render(&mut text).map_err(|error| Failure::Work(format!("{name}: {error}")))?;
+    Ok((name, String::from_utf8_lossy(&text).into_owned()))
+}
+
+/// Print the completions for a shell.
+#[derive(Debug, Args)]
+struct CompletionsArguments {
+    /// The shell
+    shell: Shell,
+}
+
+/// Prints a shell's completions of these commands.
+///
+/// # Errors
+///
+/// When standard output cannot be written.
+fn complete(arguments: &CompletionsArguments, mut commands: clap::Command) -> Result<(), Failure> {
+    let name = commands.get_name().to_owned();
+    let mut script = Vec::new();
+    clap_complete::generate(arguments.shell, &mut commands, name, &mut script);
+    Ok(print(&String::from_utf8_lossy(&script))?)
 }

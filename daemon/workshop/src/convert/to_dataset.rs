@@ -15,8 +15,7 @@ use dynocar_analysis::dataset::{
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::{SampleField, TrainSample};
 
-use super::recorded_dataset::{FileContent, RecordedDataset};
-use super::rows::WHEEL_SLIDE;
+use super::{FileContent, RecordedDataset, WHEEL_SLIDE};
 use dynocar_mcap::error::{AtPath, ReadError};
 use dynocar_mcap::recording::Recording;
 

@@ -5,13 +5,14 @@ use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
+use dynocar_analysis::dataset::formats::MCAP;
 use dynocar_analysis::dataset::{MANIFEST_FILE, Manifest, RunEntry, recorded_unix_s};
 use dynocar_shared::TrainId;
 use sha2::{Digest, Sha256};
 use tracing::warn;
 
-use super::memory::{KnownFile, LearnerMemory};
-use super::{LearnError, recordings};
+use super::LearnError;
+use super::memory::{KnownFile, LearnerMemory, is_finished, take_up, unpacked_in};
 use crate::report::provenance::hex;
 use dynocar::dataset::read_text;
 use dynocar::models::UtcSecond;
@@ -86,14 +87,14 @@ pub fn runs_of(
     let unpacked = places.own.join("runs").join(train.0.to_string());
     for path in lying.recordings.iter().filter(is_own) {
         let Ok((sha256, modified)) = hash_of(path, memory) else { continue };
-        recordings::take_up((path, &sha256), train, (&unpacked, memory), modified)?;
+        take_up((path, &sha256), train, (&unpacked, memory), modified)?;
     }
     let mut runs = Vec::new();
     for folder in lying.datasets.iter().filter(is_own) {
         let name = folder.strip_prefix(places.runs).unwrap_or(folder).display().to_string();
         runs.extend(runs_in(folder, &name, None, memory));
     }
-    for (folder, source) in recordings::unpacked_in(&unpacked) {
+    for (folder, source) in unpacked_in(&unpacked) {
         runs.extend(runs_in(&folder, &source.name, Some(source.recorded), memory));
     }
     let newest = runs.iter().map(|run| run.recorded).max().unwrap_or(now).min(now);
@@ -121,8 +122,7 @@ fn look(folder: &Path, depth: usize, lying: &mut Lying) -> io::Result<()> {
         if path.is_dir() && depth > 0 {
             // A folder that has gone or is closed holds no runs.
             let _ = look(&path, depth - 1, lying);
-        } else if path.extension().is_some_and(|it| it == "mcap") && recordings::is_finished(&path)
-        {
+        } else if MCAP.is_of(&path) && is_finished(&path) {
             lying.recordings.push(path);
         }
     }
@@ -140,7 +140,7 @@ fn is_of(train: TrainId, path: &Path, places: Places) -> bool {
     let named = inside.components().filter_map(number).find(|it| places.trains.contains(it));
     match named {
         Some(named) => named == train,
-        None => places.trains.len() == 1 || path.extension().is_some_and(|it| it == "mcap"),
+        None => places.trains.len() == 1 || MCAP.is_of(path),
     }
 }
 

@@ -1,26 +1,30 @@
-//! Conclusion of an explanation for the store: a candidate, events, or nothing new.
+//! Findings of an explanation, and its conclusion for the store: a candidate, events, an open question, or nothing new.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
+use dynocar::models::origin::{EventWindow, HeldOutError, SourceFile};
+use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
+use dynocar::models::{
+    FoundEffect, MaintenanceEvent, ModelFigure, ModelHash, ModelText, NewModel, Origin,
+    TrainModels, UtcSecond,
+};
+use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::Explanation;
-use dynocar_analysis::explain::answer::{EffectAnswer, Verdict};
+use dynocar_analysis::explain::answer::{EffectAnswer, ExplainAnswer, ParameterValue, Verdict};
+use dynocar_analysis::explain::effects::policy_of;
 use dynocar_analysis::explain::evidence::{SCORE_MIN, p_value};
+use dynocar_model::words::{self, kind_name};
+use dynocar_shared::TrainId;
+use dynocar_shared::vocabulary::EffectKind;
 use tracing::{info, warn};
 
 use super::LearnError;
-use super::finding::{
-    event, found_effect, improvement, is_event, is_to_be_reported, question, sentence,
-};
 use super::memory::{LearnerMemory, OpenQuestion};
 use super::pool::Pool;
 use crate::report;
 use crate::report::provenance::{FileDigest, Provenance, hex};
 use crate::updated::{UpdatedTexts, updated_texts};
-use dynocar::models::origin::{EventWindow, SourceFile};
-use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
-use dynocar::models::{
-    MaintenanceEvent, ModelHash, ModelText, NewModel, Origin, TrainModels, UtcSecond,
-};
 
 /// Conclusion of an explanation.
 #[derive(Clone, Debug, PartialEq)]
@@ -194,4 +198,198 @@ fn digests(model: &Path, pool: &Pool) -> Vec<FileDigest> {
         sha256: run.sha256.clone(),
     });
     of_model.chain(of_runs).collect()
+}
+
+/// Returns whether a kind acts only in the runs in which it is found, even where the answer names no runs.
+fn is_passing(kind: &str) -> bool {
+    EffectKind::from_name(kind).is_some_and(|kind| policy_of(kind).is_passing)
+}
+
+/// Returns an effect in the form in which records hold it.
+pub fn found_effect(effect: &EffectAnswer) -> FoundEffect {
+    FoundEffect {
+        kind: effect.kind.into(),
+        intervals_m: effect.place.intervals_m.clone().unwrap_or_default(),
+        parameters: figures(effect),
+    }
+}
+
+/// Returns the numbers of an effect that have a standard deviation, by name; those of a list by place or run.
+fn figures(effect: &EffectAnswer) -> BTreeMap<String, ModelFigure> {
+    let mut figures = BTreeMap::new();
+    for (name, value) in &effect.parameters {
+        let values: Vec<(String, f64)> = match value {
+            ParameterValue::Number(number) => vec![(name.clone(), *number)],
+            ParameterValue::ByRun(by_run) => {
+                by_run.iter().map(|(run, number)| (format!("{name} {run}"), *number)).collect()
+            }
+            ParameterValue::List(list) => listed("", name, list.iter().copied()),
+            ParameterValue::Sections(list) => {
+                listed("mass_factor ", name, list.iter().map(|it| it.mass_factor))
+            }
+            ParameterValue::Windows(list) => {
+                listed("mass_factor ", name, list.iter().map(|it| it.mass_factor))
+            }
+            ParameterValue::Profile(_) | ParameterValue::Formula(_) => continue,
+        };
+        let deviations: Vec<f64> = match effect.std.get(name) {
+            Some(ParameterValue::Number(std)) => vec![*std],
+            Some(ParameterValue::List(list)) => list.clone(),
+            Some(ParameterValue::ByRun(by_run)) => by_run.values().copied().collect(),
+            _ => continue,
+        };
+        let known = values.into_iter().zip(deviations);
+        figures.extend(known.map(|((name, value), std)| (name, ModelFigure { value, std })));
+    }
+    figures
+}
+
+fn listed(what: &str, name: &str, list: impl Iterator<Item = f64>) -> Vec<(String, f64)> {
+    list.enumerate().map(|(k, number)| (format!("{what}{name}[{k}]"), number)).collect()
+}
+
+/// Returns true for an effect of certain runs or windows of time, which no file of a train or a line can express.
+pub fn is_event(effect: &EffectAnswer, not_expressed: &[String]) -> bool {
+    let place = &effect.place;
+    let by_run = |value: &ParameterValue| matches!(value, ParameterValue::ByRun(_));
+    not_expressed.iter().any(|kind| kind == effect.kind)
+        && (is_passing(effect.kind)
+            || place.windows.is_some()
+            || place.runs.is_some()
+            || effect.parameters.values().any(by_run))
+}
+
+/// Returns true for an event that is reported at once or is over: other kinds that act in the newest of the fit runs
+/// may be about to last, and are looked at again when there are newer ones.
+pub fn is_to_be_reported(event: &MaintenanceEvent, explanation: &Explanation) -> bool {
+    let newest = explanation.problem.runs.last().map(|run| run.file.as_str());
+    let acts_in_newest = event.windows.iter().any(|window| Some(window.run.as_str()) == newest);
+    is_passing(&event.kind) || !acts_in_newest
+}
+
+/// Returns the errors on the runs held out, where the model is better on them.
+pub fn improvement(answer: &ExplainAnswer) -> Option<HeldOutError> {
+    let (before_mps, after_mps) = (answer.rmse_before?, answer.rmse_after?);
+    (after_mps < before_mps).then_some(HeldOutError { before_mps, after_mps })
+}
+
+/// Returns an event of the runs that a pool holds; `model` was in force.
+pub fn event(
+    effect: &EffectAnswer,
+    pool: &Pool,
+    explanation: &Explanation,
+    (model, found): (ModelHash, UtcSecond),
+) -> MaintenanceEvent {
+    let windows = windows(effect, pool, explanation);
+    let FoundEffect { kind, intervals_m, parameters } = found_effect(effect);
+    let times = |windows: &[EventWindow]| {
+        let of = |window: &EventWindow| {
+            pool.runs.iter().find(|run| run.sha256 == window.sha256).map(|run| run.recorded)
+        };
+        let times: Vec<UtcSecond> = windows.iter().filter_map(of).collect();
+        Some([*times.iter().min()?, *times.iter().max()?])
+    };
+    let acted = times(&windows);
+    let p_value = effect.p_value;
+    let mut event = MaintenanceEvent {
+        sentence: String::new(),
+        size: parameters,
+        kind,
+        found,
+        acted,
+        model,
+        intervals_m,
+        p_value,
+        windows,
+    };
+    event.sentence = sentence(&event);
+    event
+}
+
+/// Returns the windows of an effect; whole runs where only these are known, all fit runs where not even they are.
+fn windows(effect: &EffectAnswer, pool: &Pool, explanation: &Explanation) -> Vec<EventWindow> {
+    let sha256_of = |name: &str| {
+        pool.runs
+            .iter()
+            .find(|run| run.name == name)
+            .map(|run| run.sha256.clone())
+            .unwrap_or_default()
+    };
+    if let Some(windows) = &effect.place.windows {
+        let window = |it: &dynocar_analysis::explain::answer::RunWindow| EventWindow {
+            sha256: sha256_of(&it.run),
+            run: it.run.clone(),
+            t_start_s: it.t_start_s,
+            t_end_s: it.t_end_s,
+        };
+        return windows.iter().map(window).collect();
+    }
+    let by_run = effect.parameters.values().find_map(|value| match value {
+        ParameterValue::ByRun(by_run) => Some(by_run.keys().cloned().collect()),
+        _ => None,
+    });
+    let fit_runs = || explanation.problem.runs.iter().map(|run| run.file.clone()).collect();
+    let names: Vec<String> = effect.place.runs.clone().or(by_run).unwrap_or_else(fit_runs);
+    names.iter().filter_map(|name| whole(name, &pool.dataset, sha256_of(name))).collect()
+}
+
+fn whole(name: &str, dataset: &Dataset, sha256: String) -> Option<EventWindow> {
+    let run = dataset.runs.iter().find(|run| run.file == name)?;
+    let time_s = |sample: &dynocar_shared::TrainSample| sample.time_ns as f64 * 1e-9;
+    Some(EventWindow {
+        run: name.into(),
+        sha256,
+        t_start_s: time_s(run.samples.first()?),
+        t_end_s: time_s(run.samples.last()?),
+    })
+}
+
+/// Returns an event in a sentence for people.
+pub fn sentence(event: &MaintenanceEvent) -> String {
+    let kind = kind_name(&event.kind);
+    let mut runs: Vec<&str> = event.windows.iter().map(|window| &window.run[..]).collect();
+    runs.dedup();
+    let shown = match runs.as_slice() {
+        [run] => format!("run {run}"),
+        [first, .., last] => format!("{} runs from {first} to {last}", runs.len()),
+        [] => "no run".into(),
+    };
+    let mut text = format!("{kind} in {shown}");
+    if let Some([first, last]) = event.acted {
+        text += &match first == last {
+            true => format!(", recorded {first}"),
+            false => format!(", recorded {first} to {last}"),
+        };
+    }
+    if !event.intervals_m.is_empty() {
+        text += &format!(", {}", words::stretches(&event.intervals_m));
+    }
+    let sizes = event.size.iter().filter_map(|(name, it)| it.of_effect(name));
+    let sizes: Vec<String> = sizes.take(words::PLACES_MAX).collect();
+    if sizes.is_empty() { text } else { format!("{text}: {}", sizes.join(", ")) }
+}
+
+/// Returns the open question of the runs; `None` where they determine enough.
+pub fn question(
+    answer: &ExplainAnswer,
+    train: TrainId,
+    (model, at): (ModelHash, UtcSecond),
+) -> Option<OpenQuestion> {
+    if !matches!(answer.verdict, Verdict::Ambiguous | Verdict::Unknown) {
+        return None;
+    }
+    let effects = answer.effects.iter().map(|effect| effect.kind);
+    let mut kinds: Vec<String> =
+        effects.chain(answer.ambiguous_with.iter().copied()).map(str::to_owned).collect();
+    kinds.sort();
+    kinds.dedup();
+    Some(OpenQuestion {
+        train: train.0,
+        at,
+        model,
+        verdict: answer.verdict.name().into(),
+        kinds,
+        statement: answer.statement.clone(),
+        experiment: answer.experiment.clone(),
+    })
 }

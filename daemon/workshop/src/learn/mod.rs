@@ -2,18 +2,15 @@
 //! and puts its findings into the store of models. It is never in the control cycle.
 //!
 //! A [`Learner`] works in rounds; clock and folders come from outside, and a round neither sleeps nor waits. The
-//! process around it ([`round_schedule`]) starts a round at a new suspicion, at a time of each day, or once.
+//! process around it (`dynocar learn`) starts a round at a new suspicion, at a time of each day, or once.
 //!
 //! # Layout, in the order of the work
 //!
-//! - [`memory`]: memory from round to round
-//! - [`recordings`]: recordings, each unpacked once
+//! - [`memory`]: memory from round to round; recordings, each unpacked once
 //! - [`available_runs`]: the available runs
 //! - [`pool`]: the runs that are explained together, with the model in force as their train and line
-//! - [`finding`]: findings of an explanation: a candidate, events, an open question
-//! - [`conclusion`]: entries for the store
+//! - [`conclusion`]: findings of an explanation, a candidate, events or an open question, as entries for the store
 //! - [`learner`]: a round of learning
-//! - [`round_schedule`]: the times of the rounds
 //! - [`page`]: the history as a page, with the errors that the daemon's trials measured
 
 use std::path::PathBuf;
@@ -29,13 +26,10 @@ use super::convert::ToDatasetError;
 
 pub mod available_runs;
 pub mod conclusion;
-pub mod finding;
 pub mod learner;
 pub mod memory;
 pub mod page;
 pub mod pool;
-pub mod recordings;
-pub mod round_schedule;
 
 /// Why learning does not go on.
 #[derive(Debug, thiserror::Error)]

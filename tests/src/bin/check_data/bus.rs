@@ -9,7 +9,7 @@ use dynocar_analysis::explain::answer::ExplainAnswer;
 use dynocar_analysis::explain::explain;
 use dynocar_analysis::explain::stop_to_stop::StopToStop;
 use dynocar_shared::PipelineKind;
-use dynocar_workshop::survey::answer::SurveyAnswer;
+use dynocar_workshop::survey::SurveyAnswer;
 use dynocar_workshop::survey::survey_folder;
 
 use super::Report;

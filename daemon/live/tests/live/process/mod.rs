@@ -6,7 +6,7 @@ mod viewer;
 use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use dynocar_mcap::codec::{decode_sample, decode_snapshot, encode_sample};
+use dynocar_mcap::topic::{decode_sample, decode_snapshot, encode_sample};
 use dynocar_shared::PipelineKind;
 
 use crate::support_site::{Controller, TestSite};

@@ -4,19 +4,18 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use dynocar::cli::Failure;
-use dynocar::dataset::is_parquet_path;
 use dynocar::text_file::{read_beginning, read_bytes};
 use dynocar_analysis::dataset::guess::layout;
 use dynocar_analysis::dataset::text_layout::{TrainRows, decoded, guessed};
 use dynocar_analysis::dataset::trains::{TrainsColumn, only};
 use dynocar_analysis::dataset::{
     ColumnMapping, DatasetError, DatasetFiles, DatasetHead, FileProblem, Run, RunColumns,
-    SourcePosition, TrainColumn,
+    SourcePosition, TrainColumn, formats,
 };
-use dynocar_parquet::columns::columns_of;
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
 use crate::dataset::{self, real};
+use crate::formats::{RunFile, RunReader, run_reader};
 
 /// Name and text of a file.
 pub type NamedText = (String, String);
@@ -31,8 +30,8 @@ pub fn texts(
     given: Option<&'static Encoding>,
 ) -> Result<(Vec<NamedText>, &'static Encoding), Failure> {
     let mut files = Vec::new();
-    if let Some(parquet) = tables(paths)? {
-        return Ok((parquet, UTF_8));
+    if let Some(tables) = tables(paths)? {
+        return Ok((tables, UTF_8));
     }
     for path in paths {
         let label = path.display().to_string();
@@ -60,30 +59,33 @@ pub fn texts(
             );
             return Err(Failure::At(SourcePosition::whole(&label), words));
         }
-        let text = decoded(bytes, encoding).map_err(|problem| problem.of(&label))?;
+        let text = decoded(bytes, encoding).and_then(|it| formats::of_run(&label).rows(it));
+        let text = text.map_err(|problem| problem.of(&label))?;
         texts.push((label, text));
     }
     Ok((texts, encoding))
 }
 
-/// Parquet files as texts of their columns of numbers and times, as CSV has them; `None` for other files.
+/// Files that a library reads as texts of their columns of numbers and times, as CSV has them; `None` for texts.
 fn tables(paths: &[PathBuf]) -> Result<Option<Vec<NamedText>>, Failure> {
-    match paths.iter().filter(|path| is_parquet_path(path)).count() {
+    let readers: Vec<_> = paths.iter().filter_map(run_reader).collect();
+    match readers.len() {
         0 => return Ok(None),
         count if count == paths.len() => {}
         _ => return Err(Failure::Input("--csv: expected files of one format".into())),
     }
-    let table = |path: &PathBuf| {
+    let table = |(path, read): (&PathBuf, RunReader)| {
         let label = path.display().to_string();
         let refused =
             |words: String| Failure::At(SourcePosition::whole(&label), format!("{label}: {words}"));
         let RunColumns { columns: names, trains } =
-            columns_of(path, &[], &TrainRows::Unsaid).map_err(|it| refused(it.to_string()))?;
+            read(RunFile::OnDisk(path), &[], &TrainRows::Unsaid)
+                .map_err(|it| refused(it.to_string()))?;
         let mut columns: Vec<(String, Result<Vec<f64>, String>)> = Vec::new();
         for name in names.iter().map(|it| it.name.clone()) {
-            let read = numbers_of(path, &name);
+            let numbers = numbers_of((path, read), &name);
             if trains.as_ref().is_none_or(|it| it.name != name.trim()) {
-                columns.push((name, read));
+                columns.push((name, numbers));
             }
         }
         if columns.iter().all(|it| it.1.is_err()) {
@@ -93,14 +95,15 @@ fn tables(paths: &[PathBuf]) -> Result<Option<Vec<NamedText>>, Failure> {
         }
         Ok((label, as_csv(&columns, trains.as_ref())))
     };
-    paths.iter().map(table).collect::<Result<_, Failure>>().map(Some)
+    paths.iter().zip(readers).map(table).collect::<Result<_, Failure>>().map(Some)
 }
 
 /// Returns a column's numbers, times in s.
-fn numbers_of(path: &Path, name: &str) -> Result<Vec<f64>, String> {
+fn numbers_of((path, read): (&Path, RunReader), name: &str) -> Result<Vec<f64>, String> {
     let mapping = ColumnMapping::of_time(name);
-    let read = columns_of(path, &[mapping], &TrainRows::All).map_err(|it| it.to_string())?;
-    read.columns.into_iter().find_map(|it| it.values).ok_or_else(|| "no values".into())
+    let found = read(RunFile::OnDisk(path), &[mapping], &TrainRows::All);
+    let found = found.map_err(|it| it.to_string())?;
+    found.columns.into_iter().find_map(|it| it.values).ok_or_else(|| "no values".into())
 }
 
 /// Columns as text; one that cannot be mapped holds the type of its contents.

@@ -15,7 +15,7 @@ use prost_types::{FileDescriptorProto, FileDescriptorSet};
 
 use super::copying::{CopyWriter, copy};
 use super::error::{AtPath, CopyError, WriteError};
-use super::message::{MessageField, message};
+use super::event::{MessageField, message};
 use super::reading::{Raw, RecordingItem, Visitor};
 use super::recording::trains_of;
 use super::schema::{fields_of, message};
