@@ -16,7 +16,6 @@
 //! - [`output`]: results for people and for machines, and failures
 //! - `parallel`: the same work over many cases, on some threads
 //! - `statistics`: means and quantiles over seeded runs
-//! - `chance`: random numbers
 //!
 //! # Examples
 //!
@@ -27,7 +26,6 @@
 //! ```
 
 mod brakes;
-mod chance;
 pub mod cli;
 mod drive;
 mod ending;

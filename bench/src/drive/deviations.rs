@@ -6,10 +6,10 @@ use dynocar_shared::stopping::RailAdhesion;
 use dynocar_shared::{RailCondition, Uncertain};
 
 use super::knowledge::Ability;
-use crate::chance::Chance;
 use crate::output::Record;
 use crate::scenarios::brake::Brake;
 use crate::scenarios::world::{LoadSource, Mistakes, Scenario, Traffic, World};
+use dynocar_tests::chance::Chance;
 
 /// Particular brakes, rail or behaviour of the daemon.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,10 +4,10 @@ use super::answers::ASKED;
 use super::deviations::Service;
 use super::journey::DrivenLeg;
 use super::run::{DrivenRecord, Informant};
-use crate::chance::Chance;
 use crate::output::Record;
 use crate::scenarios::score::{QuantityScore, Scores};
 use crate::statistics::{mean, quantiles};
+use dynocar_tests::chance::Chance;
 
 /// Number of random selections of the trains behind an interval.
 const DRAWS: usize = 400;

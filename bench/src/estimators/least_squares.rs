@@ -6,7 +6,7 @@ use dynocar_core::filter::{Mils, Penalty, Rls};
 use nalgebra::Vector3;
 
 use super::measure::EstimatorCase;
-use crate::chance::Chance;
+use dynocar_tests::chance::Chance;
 
 type Row = (Vector3<f64>, f64);
 

@@ -14,7 +14,7 @@ use dynocar_model::train::Davis;
 use nalgebra::Vector3;
 
 use super::measure::EstimatorCase;
-use crate::chance::Chance;
+use dynocar_tests::chance::Chance;
 
 /// Rotating-mass factor of every run.
 const ROTATING_MASS_FACTOR: f64 = 0.06;

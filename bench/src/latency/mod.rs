@@ -21,12 +21,12 @@ use dynocar::output::report_line;
 
 use self::case::LatencyCase;
 use self::report::{MeasuredCase, Rounds};
-use crate::chance::Chance;
 use crate::ending;
 use crate::open_loop::traffic::TrafficPlan;
 use crate::open_loop::trial::{Extent, run};
 use crate::output::{BenchError, OutputArguments, expect};
 use crate::rig::cores::{CoreArguments, Cores, bind, in_thread, prioritise};
+use dynocar_tests::chance::Chance;
 
 /// Sample → snapshot through real processes, compared with the floor and with alternatives.
 #[derive(Debug, Args)]

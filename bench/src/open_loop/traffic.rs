@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
-use crate::chance::Chance;
+use dynocar_tests::chance::Chance;
 
 /// The traffic of every train.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -10,8 +10,8 @@ use dynocar_core::pipeline::braking::settings::WalkSettings;
 use dynocar_model::train::{BrakeGear, Davis, TrainModel};
 use dynocar_shared::RailCondition;
 
-use crate::chance::Chance;
 use crate::statistics::KMH;
+use dynocar_tests::chance::Chance;
 
 /// Time in s between two measurements.
 pub const STEP_S: f64 = 0.2;

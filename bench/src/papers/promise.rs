@@ -78,7 +78,8 @@ impl PromiseVerdict {
     /// Judges a row.
     pub fn from_row(row: &PaperRow) -> Self {
         let mut verdict = PromiseVerdict {
-            nees_band: row.nees_freedom.filter(|freedom| *freedom > 0.0).map(nees_band),
+            // The errors of a single run do not show how much a run's mean scatters.
+            nees_band: row.nees_freedom.filter(|it| it.is_finite() && *it > 0.0).map(nees_band),
             promised: Vec::new(),
             broken: Vec::new(),
             may_be_wider: MAY_BE_WIDER

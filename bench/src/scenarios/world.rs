@@ -6,7 +6,7 @@ use dynocar_model::train::{Davis, TrainModel};
 use dynocar_tests::simulator::TrueDeviations;
 
 use super::brake::Brake;
-use crate::chance::Chance;
+use dynocar_tests::chance::Chance;
 
 /// The kinds of traffic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

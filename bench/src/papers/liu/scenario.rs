@@ -5,13 +5,14 @@
 //! Its Fisher information about the true speed is the sum over steps of (dp/dspeed)² / p, averaged over where in a step
 //! the true speed lies.
 
+use dynocar_model::simulate::elements::quantised;
 use dynocar_model::simulate::motion::{SimulatedMotion, advance};
 use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, SMatrix, SVector};
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
-use crate::chance::Chance;
 use crate::statistics::jacobian;
+use dynocar_tests::chance::Chance;
 
 /// Approximately the last row of table 1: w0 = 2.2 + 0.025 v + 0.0013 v² in N/kN, v in km/h.
 pub const THETA_KMH: [f64; 3] = [2.2, 0.025, 0.0013];
@@ -103,7 +104,7 @@ pub fn measure(condition: RunCondition, seed: u64) -> Vec<Vec<MeasuredRun>> {
                     speed_kmh += random.sign() * size;
                 }
                 let is_missing = random.uniform() < condition.missing_share;
-                let speed_kmh = (speed_kmh / QUANTUM_KMH).round() * QUANTUM_KMH;
+                let speed_kmh = quantised(speed_kmh, QUANTUM_KMH);
                 (!is_missing).then_some(MeasuredRun { time_s: STEP_S * index as f64, speed_kmh })
             });
             samples.collect()

@@ -4,13 +4,15 @@
 //! computes the force from an assumed mass: 117.1 t, as if the testers of Table 3 were always on board, or the mass
 //! that the filter has learned on the previous leg.
 
+use dynocar_model::simulate::motion::deceleration_mps2;
+
 use super::ride::{kalman, known_resistance, leg, measure};
 use super::shuttle::{
     BRAKE_MAX_N, EMPTY_MASS_KG, PERIOD_S, STATIONS_M, Shuttle, ShuttleMoment, calm,
 };
-use crate::chance::Chance;
 use crate::papers::row::{PaperRow, Seeds, WANG};
 use crate::statistics::{mean, straight_line};
+use dynocar_tests::chance::Chance;
 
 /// The fixed mass in kg that the controller assumes without learning.
 const ASSUMED_MASS_KG: f64 = 117_100.0;
@@ -146,7 +148,7 @@ fn plan_follower(case: Case, cruise_mps: f64) -> impl FnMut(&Shuttle, &ShuttleMo
     move |shuttle, now, to_m| {
         let left_m = (to_m - now.position_m).abs();
         // Wherever the plan has led, the train has to stop at the platform; no mass is assumed.
-        let stop_mps2 = now.speed_mps * now.speed_mps / (2.0 * left_m.max(1.0));
+        let stop_mps2 = deceleration_mps2((now.speed_mps, 0.0), left_m.max(1.0));
         is_stopping |= stop_mps2 > BRAKING_MPS2;
         if is_stopping {
             return -now.mass_kg * stop_mps2.clamp(0.5, 1.0);

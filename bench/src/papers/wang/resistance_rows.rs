@@ -15,10 +15,10 @@ use nalgebra::Vector3;
 use super::bound::FisherInformation;
 use super::ride::measure;
 use super::shuttle::{Shuttle, ShuttleMoment, calm};
-use crate::chance::Chance;
 use crate::papers::row::{PaperRow, Seeds, WANG};
 use crate::papers::score::{PaperScore, w0_errors};
 use crate::statistics::{mean, root_mean_square};
+use dynocar_tests::chance::Chance;
 
 /// Samples of one crossing.
 pub const CROSSING: usize = 28_000;

@@ -17,10 +17,10 @@ use nalgebra::Vector3;
 use super::scenario::{
     CASES, DrivingProfile, NoiseFreeRun, all_speeds_mps, davis_covariance, drive, fast_speeds_mps,
 };
-use crate::chance::Chance;
 use crate::papers::row::{PaperRow, Seeds, XIA};
 use crate::papers::score::{PaperScore, w0_errors};
 use crate::statistics::root_mean_square;
+use dynocar_tests::chance::Chance;
 
 /// Identified a of Table 3, case by case.
 const PUBLISHED_A: [f64; 4] = [0.7901, 0.2956, 1.0525, 0.3485];

@@ -19,10 +19,10 @@ use super::scenario::{
     CASES, DrivingProfile, NoiseFreeRun, ROTATING_MASS_FACTOR, SAMPLING_M, SPEED_NOISE_MPS,
     all_speeds_mps, disturbed_davis_covariance, drive, fast_speeds_mps,
 };
-use crate::chance::Chance;
 use crate::papers::row::{PaperRow, Seeds, XIA};
 use crate::papers::score::{PaperScore, w0_std};
 use crate::statistics::{mean, root_mean_square};
+use dynocar_tests::chance::Chance;
 
 /// Data capacity I of the paper's window.
 const WINDOW: usize = 20;

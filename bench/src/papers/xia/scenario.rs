@@ -8,12 +8,13 @@
 use dynocar_core::filter::triangular::{TriangularAccumulator, TriangularSystem};
 use dynocar_estimators::xia::trajectory::step::TrajectoryStep;
 use dynocar_model::force::mps2_per_n_per_kn;
+use dynocar_model::simulate::elements::autoregressed;
 use dynocar_model::track::{Track, TrackCurve};
 use dynocar_model::train::Davis;
 use nalgebra::{DMatrix, Matrix3};
 
-use crate::chance::Chance;
 use crate::statistics::{self, KMH};
+use dynocar_tests::chance::Chance;
 
 /// Mass in t.
 pub const MASS_T: f64 = 981.7;
@@ -89,8 +90,7 @@ impl NoiseFreeRun {
             let disturbed = Davis { a: davis.a + disturbance, ..*davis };
             speeds_mps.push(next_speed_mps(step, &disturbed, speeds_mps[i]));
             let kept = (-step.size / (self.speeds_mps[i] * DISTURBANCE_S)).exp();
-            disturbance = kept * disturbance
-                + (1.0 - kept * kept).sqrt() * DISTURBANCE_N_PER_KN * random.normal();
+            disturbance = autoregressed(disturbance, kept, DISTURBANCE_N_PER_KN, random.normal());
         }
         NoiseFreeRun { steps: self.steps.clone(), speeds_mps }
     }

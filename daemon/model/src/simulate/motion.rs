@@ -35,6 +35,11 @@ fn speed_after_dip(speed_mps: f64, start: f64, end: f64, step_s: f64) -> f64 {
     (lowest_mps.max(0.0) + 0.5 * end * (step_s - turn_s)).min(SPEED_MAX_MPS)
 }
 
+/// Returns the constant deceleration in m/s² that takes a train from one speed in m/s to another over a distance in m.
+pub fn deceleration_mps2((from_mps, to_mps): (f64, f64), over_m: f64) -> f64 {
+    (from_mps * from_mps - to_mps * to_mps) / (2.0 * over_m)
+}
+
 /// One step of Heun's method for a train whose acceleration in m/s² depends on the time in s since
 /// the step's start, and on distance and speed.
 ///
