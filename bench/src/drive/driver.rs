@@ -8,9 +8,8 @@
 
 use dynocar_model::simulate::elements::slewed;
 
-use super::braking::BrakingCurve;
 use super::knowledge::{Ability, Knowledge};
-use super::plan::{COASTING_MIN_SHARE, DrivePlan, PlannedLeg, Planner};
+use super::plan::{BrakingCurve, COASTING_MIN_SHARE, DrivePlan, PlannedLeg, Planner};
 
 /// Greatest bandwidth in rad/s of the estimates of the speed and of the unexplained acceleration.
 const OBSERVER_RAD_PER_S: f64 = 0.8;

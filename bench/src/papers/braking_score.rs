@@ -18,9 +18,8 @@ use super::braking::{
     Braking, BrakingMoment, PRESSURE_PA, SPEED_NOISE_MPS, STEP_S, ShareStep, WINDOW, disc_friction,
     train,
 };
-use super::row::{PaperRow, Seeds};
-use super::score;
-use crate::parallel;
+use super::row::{PaperRow, PaperScore, Seeds};
+use crate::ending;
 use crate::statistics::{mean, root_mean_square};
 
 /// Lag in s of our smoother.
@@ -98,13 +97,13 @@ fn coefficient(snapshot: &ParameterSnapshot) -> Option<(f64, f64)> {
 /// Runs `work` for every seed, on as many threads as the machine has.
 pub fn over_seeds<T: Send>(seeds: Seeds, work: impl Fn(u64) -> T + Sync) -> Vec<T> {
     let threads = std::thread::available_parallelism().map_or(1, |count| count.get());
-    parallel::over(&seeds.range().collect::<Vec<_>>(), threads, |&seed| work(seed))
+    ending::over(&seeds.range().collect::<Vec<_>>(), threads, |&seed| work(seed))
 }
 
 /// Errors of one estimator over all runs.
 #[derive(Clone, Debug)]
 pub struct BrakingScore {
-    errors: score::PaperScore,
+    errors: PaperScore,
     /// Mean of |error| / truth in %.
     pub relative_percent: f64,
     /// Mean of (error / claimed standard deviation)² of each run.
@@ -151,7 +150,7 @@ impl BrakingScore {
     /// Returns the errors of runs, pooled.
     pub fn from_runs<'a>(runs: impl Iterator<Item = &'a Vec<ScoredBraking>>) -> Self {
         let (mut errors, mut relative, mut nees_of_runs) =
-            (score::PaperScore::default(), Vec::new(), Vec::new());
+            (PaperScore::default(), Vec::new(), Vec::new());
         for run in runs.filter(|run| !run.is_empty()) {
             nees_of_runs.push(mean(run.iter().map(|it| (it.error / it.std).powi(2))));
             relative.extend(run.iter().map(|it| 100.0 * (it.error / it.truth).abs()));

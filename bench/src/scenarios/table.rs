@@ -13,9 +13,8 @@ use super::brake::Brake;
 use super::scenario_train::{DriveMoment, ScenarioTrain};
 use super::score::{Answer, COUNTS_MPS, QuantityScore, Scores};
 use super::world::{LoadSource, Mistakes, Scenario, Traffic, World};
-use crate::ending::until_due;
+use crate::ending::{over_until_due, until_due};
 use crate::output::Record;
-use crate::parallel;
 
 /// Time in s of the first comparison of errors with the bound, and the factor from each time to the next.
 const COMPARED_FIRST_S: f64 = 60.0;
@@ -125,7 +124,7 @@ pub struct Plan<'a> {
 pub fn run(plan: &Plan<'_>) -> Result<Vec<Record>, SettingError> {
     let of = |row| plan.kinds.iter().map(move |&kind| (row, kind));
     let cases: Vec<(&NamedScenario, PipelineKind)> = plan.scenarios.iter().flat_map(of).collect();
-    let rows = parallel::until_due(&cases, plan.threads, |(row, kind)| measure(plan, row, *kind));
+    let rows = over_until_due(&cases, plan.threads, |(row, kind)| measure(plan, row, *kind));
     Ok(rows.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
 }
 

@@ -194,7 +194,7 @@ fn derivatives((start_kmh, end_kmh): (f64, f64)) -> Vec<[f64; 4]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::papers::score::w0_std;
+    use crate::papers::row::w0_std;
 
     #[test]
     fn the_runs_coast_between_the_speeds_they_should() {

@@ -9,8 +9,8 @@ use super::bound::{FisherInformation, mass_std_in_wind};
 use super::resistance_rows::{CROSSING, joint_least_squares};
 use super::ride::{kalman, known_resistance, leg, measure, presumed, staged, there_and_back, wind};
 use super::shuttle::{DisturbanceLaw, EMPTY_MASS_KG, Shuttle, calm};
+use crate::papers::row::PaperScore;
 use crate::papers::row::{PaperRow, Seeds, WANG};
-use crate::papers::score::PaperScore;
 use crate::statistics::mean;
 use dynocar_tests::chance::Chance;
 

@@ -16,7 +16,7 @@ use super::bound::FisherInformation;
 use super::ride::measure;
 use super::shuttle::{Shuttle, ShuttleMoment, calm};
 use crate::papers::row::{PaperRow, Seeds, WANG};
-use crate::papers::score::{PaperScore, w0_errors};
+use crate::papers::row::{PaperScore, w0_errors};
 use crate::statistics::{mean, root_mean_square};
 use dynocar_tests::chance::Chance;
 

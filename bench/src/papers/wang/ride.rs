@@ -17,7 +17,7 @@ use super::shuttle::{
     BRAKE_MAX_N, CURVE_RADIUS_M, DisturbanceLaw, EMPTY_MASS_KG, PERIOD_S, STATIONS_M, Shuttle,
     ShuttleMoment,
 };
-use crate::rig::pipelines::resolving;
+use crate::rig::resolving;
 use crate::statistics::KMH;
 use dynocar_tests::chance::Chance;
 
