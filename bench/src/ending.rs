@@ -1,5 +1,5 @@
-//! Ctrl-C: a command finishes its present work, gives its results so far, and ends with [`STATUS`]; a second Ctrl-C ends it
-//! at once. And the same work over many cases, on some threads, until then.
+//! Ctrl-C: a command finishes its present work, gives its results so far, and ends with [`STATUS`]; a second Ctrl-C
+//! ends it at once. And the same work over many cases, on some threads, until then.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};

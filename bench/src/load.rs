@@ -1,8 +1,8 @@
-//! `dynocar-bench load`: many trains against one daemon. The load of several trains with some pipelines and its result, the
-//! highest rate without loss, and how latency, load and memory grow with trains and pipelines.
+//! `dynocar-bench load`: many trains against one daemon. The load of several trains with some pipelines and its result,
+//! the highest rate without loss, and how latency, load and memory grow with trains and pipelines.
 //!
-//! One process stands for all controllers: it publishes every train's samples at their appointed times and polls the trains
-//! in turn, on a core of its own.
+//! One process stands for all controllers: it publishes every train's samples at their appointed times and polls the
+//! trains in turn, on a core of its own.
 
 use clap::Args;
 use dynocar::config::IdleStrategy;

@@ -1,5 +1,5 @@
-//! The residual monitor over seeded simulations, fed sample by sample: the delay until it names an effect that begins to
-//! act, the time for which it names one that does not act, and its false alarms.
+//! The residual monitor over seeded simulations, fed sample by sample: the delay until it names an effect that begins
+//! to act, the time for which it names one that does not act, and its false alarms.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

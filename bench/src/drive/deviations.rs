@@ -4,12 +4,12 @@ use dynocar_core::pipeline::braking::intake::DeclaredGear;
 use dynocar_model::train::{BrakeGear, EffortCurve, TrainModel};
 use dynocar_shared::stopping::RailAdhesion;
 use dynocar_shared::{RailCondition, Uncertain};
+use dynocar_tests::chance::Chance;
 
 use super::knowledge::Ability;
 use crate::output::Record;
 use crate::scenarios::brake::Brake;
 use crate::scenarios::world::{LoadSource, Mistakes, Scenario, Traffic, World};
-use dynocar_tests::chance::Chance;
 
 /// Particular brakes, rail or behaviour of the daemon.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,9 +1,9 @@
-//! Trains whose drivers ask a daemon in a separate process, and the daemon's usable answers as the drivers' parameters, with
-//! their errors.
+//! Trains whose drivers ask a daemon in a separate process, and the daemon's usable answers as the drivers' parameters,
+//! with their errors.
 //!
-//! In each cycle every train's sample goes through its channel, and the drivers wait until every pipeline has answered it.
-//! So the daemon misses no sample, however much faster than real time the simulation runs, and a seed gives the same figures
-//! on any machine.
+//! In each cycle every train's sample goes through its channel, and the drivers wait until every pipeline has answered
+//! it. So the daemon misses no sample, however much faster than real time the simulation runs, and a seed gives the
+//! same figures on any machine.
 
 use dynocar::config::IdleStrategy;
 use dynocar_client::{Reading, SamplePublisher, SnapshotReader};

@@ -1,6 +1,6 @@
-//! The speed profile that keeps the timetable with the least energy: accelerate in full, cruise, coast, brake. The search
-//! finds the cruising speed and the place from which the train coasts. The braking curve to the stopping point has a
-//! constant deceleration that eases off before the train stands, so that it stops without a jolt.
+//! The speed profile that keeps the timetable with the least energy: accelerate in full, cruise, coast, brake. The
+//! search finds the cruising speed and the place from which the train coasts. The braking curve to the stopping point
+//! has a constant deceleration that eases off before the train stands, so that it stops without a jolt.
 //!
 //! Distances and gradients between stops are those of the driver's map.
 

@@ -1,5 +1,5 @@
-//! Statistics of the legs of all trains, with intervals; and one picture of them: stops, timetable and energy with declared,
-//! learned and true parameters.
+//! Statistics of the legs of all trains, with intervals; and one picture of them: stops, timetable and energy with
+//! declared, learned and true parameters.
 
 use dynocar_tests::chance::Chance;
 use plotters::coord::Shift;

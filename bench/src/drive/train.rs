@@ -7,12 +7,12 @@ use dynocar_model::simulate::motion::{SimulatedMotion, advance};
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainId, TrainSample, Uncertain};
+use dynocar_tests::chance::Chance;
 
 use super::deviations::{Hidden, Service, ability, declared_gear, next_load_kg};
 use super::knowledge::{Ability, Knowledge};
 use super::plan::{PIECE_M, PlannedLeg};
 use crate::scenarios::world::{LoadSource, Mistakes, WEIGHING_STD, World};
-use dynocar_tests::chance::Chance;
 
 /// Longest step of the simulation in s.
 const STEP_MAX_S: f64 = 0.02;

@@ -1,8 +1,8 @@
 //! Timing of an estimator, in rounds; and of another build of this program next to this one: the cost of a change of an
 //! estimator.
 //!
-//! The clock is the thread's processor time, without the time of other programs. Both programs measure the same cases by
-//! turns, each in a process of its own; ratios and differences are taken round by round.
+//! The clock is the thread's processor time, without the time of other programs. Both programs measure the same cases
+//! by turns, each in a process of its own; ratios and differences are taken round by round.
 
 use std::hint::black_box;
 use std::path::Path;

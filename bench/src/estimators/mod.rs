@@ -5,6 +5,10 @@
 //!
 //! The pipelines, from sample to snapshot, and the filter of the mass go over a run of the demonstration dataset.
 
+pub mod braking;
+pub mod measure;
+pub mod resistance;
+
 use std::hint::black_box;
 use std::path::PathBuf;
 use std::rc::Rc;
@@ -20,17 +24,13 @@ use dynocar_estimators::wang::line_resistance::LineResistance;
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};
-use measure::{Effort, EstimatorCase};
 use serde_json::json;
 
+use self::measure::{Effort, EstimatorCase};
 use crate::ending::until_due;
 use crate::output::{BenchError, OutputArguments, Record, containing, table};
 use crate::papers;
 use crate::rig::{default_pipeline, resolving};
-
-pub mod braking;
-pub mod measure;
-pub mod resistance;
 
 /// Time of an update of every estimator and every pipeline.
 #[derive(Debug, Args)]

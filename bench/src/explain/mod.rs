@@ -1,9 +1,13 @@
-//! `dynocar explain` over seeded simulations of every kind of effect and of nulls: all kinds over all seeds in numbers, or
-//! the time for 1, 4 and 16 times the data.
+//! `dynocar explain` over seeded simulations of every kind of effect and of nulls: all kinds over all seeds in numbers,
+//! or the time for 1, 4 and 16 times the data.
 //!
 //! - [`scenario`]: the simulated effects, the usual errors, and their datasets
 //! - [`grade`]: the answer against the truth, and against the true law with estimated numbers
 //! - [`parameters`]: numbers and places of an answer against the true ones
+
+pub mod grade;
+pub mod parameters;
+pub mod scenario;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -24,10 +28,6 @@ use self::scenario::{
 use crate::ending::until_due;
 use crate::output::{BenchError, Record, counts, during, table};
 use crate::statistics::{median, quantiles, root_mean_square, share};
-
-pub mod grade;
-pub mod parameters;
-pub mod scenario;
 
 /// Every kind of undeclared effect, and nulls, over simulated datasets: power, false alarms,
 /// confusions, localisation, parameters and their coverage.

@@ -1,5 +1,5 @@
-//! Simulated scenarios: one kind, two at once, or a poor recording, and the usual errors besides; and the simulated datasets
-//! of `explain` and `monitor`.
+//! Simulated scenarios: one kind, two at once, or a poor recording, and the usual errors besides; and the simulated
+//! datasets of `explain` and `monitor`.
 
 use std::io;
 use std::path::Path;

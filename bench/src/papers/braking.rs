@@ -9,9 +9,9 @@ use dynocar_core::pipeline::braking::intake::{BrakingCoefficient, DeclaredGear};
 use dynocar_core::pipeline::braking::settings::WalkSettings;
 use dynocar_model::train::{BrakeGear, Davis, TrainModel};
 use dynocar_shared::RailCondition;
+use dynocar_tests::chance::Chance;
 
 use crate::statistics::KMH;
-use dynocar_tests::chance::Chance;
 
 /// Time in s between two measurements.
 pub const STEP_S: f64 = 0.2;

@@ -1,8 +1,10 @@
 //! Liu 2018: Davis coefficients from coasting by every recursive form of least squares.
 //!
-//! The paper's data are not published; its figures stand next to ours for the runs of [`scenario`]. Errors are those of w0
-//! over 40 to 72 km/h, where the runs coast, since a, b and c are hardly distinguishable from each other in this range. The
-//! paper's methods are as printed, in km/h, with eq. 5 and 6 corrected.
+//! The paper's data are not published; its figures stand next to ours for the runs of [`scenario`]. Errors are those of
+//! w0 over 40 to 72 km/h, where the runs coast, since a, b and c are hardly distinguishable from each other in this
+//! range. The paper's methods are as printed, in km/h, with eq. 5 and 6 corrected.
+
+pub mod scenario;
 
 use std::sync::Arc;
 
@@ -22,8 +24,6 @@ use self::scenario::{
 use super::row::{PaperRow, PaperScore, Seeds, w0_errors};
 use crate::rig::default_pipeline;
 use crate::statistics::{mean, straight_line};
-
-pub mod scenario;
 
 const PAPER: &str = "Liu 2018";
 

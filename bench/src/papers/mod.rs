@@ -1,16 +1,5 @@
-//! Accuracy over seeded runs: the papers' figures, their methods and ours compared with the bound; and the promises of our
-//! methods, row by row, and whether a measurement keeps them.
-
-use std::path::PathBuf;
-
-use clap::Args;
-use dynocar::output::report_line;
-use row::{PaperRow, Seeds};
-use serde_json::json;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
-
-use crate::ending::until_due;
-use crate::output::{BenchError, OutputArguments, Record, expect_none, named, table, write_csv};
+//! Accuracy over seeded runs: the papers' figures, their methods and ours compared with the bound; and the promises of
+//! our methods, row by row, and whether a measurement keeps them.
 
 mod bound;
 pub mod braking;
@@ -23,6 +12,17 @@ mod row;
 mod wang;
 mod xia;
 mod xie_and_jin;
+
+use std::path::PathBuf;
+
+use clap::Args;
+use dynocar::output::report_line;
+use serde_json::json;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use self::row::{PaperRow, Seeds};
+use crate::ending::until_due;
+use crate::output::{BenchError, OutputArguments, Record, expect_none, named, table, write_csv};
 
 /// Every table of the five papers over seeded runs: the paper's figure, its method, ours, the bound.
 ///

@@ -1,5 +1,5 @@
-//! One line of the comparison, and the runs behind it: the errors of a method over the seeds, its own standard deviations,
-//! and the bound.
+//! One line of the comparison, and the runs behind it: the errors of a method over the seeds, its own standard
+//! deviations, and the bound.
 
 use std::ops::Range;
 

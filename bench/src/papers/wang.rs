@@ -4,9 +4,16 @@
 //! - [`bound`]: the Cramér–Rao bounds
 //! - [`resistance_rows`], [`mass_rows`]: the comparison
 //!
-//! The effect of the learned mass on the traction energy of a leg is that of figure 10. The empty train of 110 t runs from
-//! the second station to the first. Its controller plans a speed for each place and computes the force from an assumed mass:
-//! 117.1 t, as if the testers of Table 3 were always on board, or the mass that the filter has learned on the previous leg.
+//! The effect of the learned mass on the traction energy of a leg is that of figure 10. The empty train of 110 t runs
+//! from the second station to the first. Its controller plans a speed for each place and computes the force from an
+//! assumed mass: 117.1 t, as if the testers of Table 3 were always on board, or the mass that the filter has learned on
+//! the previous leg.
+
+mod bound;
+mod mass_rows;
+mod resistance_rows;
+mod ride;
+mod shuttle;
 
 use dynocar_model::simulate::motion::deceleration_mps2;
 use dynocar_tests::chance::Chance;
@@ -17,12 +24,6 @@ use self::shuttle::{
 };
 use super::row::{PaperRow, Seeds, WANG};
 use crate::statistics::{mean, straight_line};
-
-mod bound;
-mod mass_rows;
-mod resistance_rows;
-mod ride;
-mod shuttle;
 
 /// Returns every row of the paper over a number of seeded runs.
 ///

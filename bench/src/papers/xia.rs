@@ -3,6 +3,9 @@
 //! - [`scenario`]: line, driver and true values from a seed, and the Cramér-Rao bound
 //! - [`online`]: Table 4 (coefficients that switch on the way)
 
+mod online;
+mod scenario;
+
 use dynocar_core::filter::levenberg_marquardt::{
     LeastSquares, Linearisation, ParameterBox, SolverSettings, minimise,
 };
@@ -24,9 +27,6 @@ use self::scenario::{
 };
 use super::row::{PaperRow, PaperScore, Seeds, XIA, w0_errors};
 use crate::statistics::root_mean_square;
-
-mod online;
-mod scenario;
 
 /// Returns every line of the comparison for this paper.
 ///

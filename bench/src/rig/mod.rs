@@ -1,8 +1,11 @@
-//! Tools for measurements of processes: separate run-time directories and cores; and the pipelines that a measurement names
-//! on its command line or builds with default settings.
+//! Tools for measurements of processes: separate run-time directories and cores; and the pipelines that a measurement
+//! names on its command line or builds with default settings.
 //!
 //! - [`site`]: a run-time directory with a daemon, removed afterwards
 //! - [`cores`]: cores and priorities; the kernel's counters of a process: processor time, memory, waits
+
+pub mod cores;
+pub mod site;
 
 use std::sync::Arc;
 
@@ -16,9 +19,6 @@ use dynocar_model::train::TrainModel;
 use dynocar_shared::{PipelineKind, TrainId, TrainSample};
 
 use crate::output::{BenchError, named};
-
-pub mod cores;
-pub mod site;
 
 /// Returns a pipeline of a kind with its default settings.
 ///

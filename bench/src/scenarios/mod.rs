@@ -9,6 +9,13 @@
 //! - [`score`]: scores of answers over a drive
 //! - [`table`]: the scenarios, and their results in numbers
 
+pub mod bound;
+pub mod brake;
+pub mod scenario_train;
+pub mod score;
+pub mod table;
+pub mod world;
+
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -24,13 +31,6 @@ use self::world::{Mistakes, World};
 use crate::output::{
     self, BenchError, OutputArguments, containing, during, expect, named, write_csv,
 };
-
-pub mod bound;
-pub mod brake;
-pub mod scenario_train;
-pub mod score;
-pub mod table;
-pub mod world;
 
 /// Resistance and mass in a user's day: how long an answer may be used, how soon, how often that
 /// changes, and whether its intervals hold.

@@ -8,11 +8,11 @@
 use dynocar_model::simulate::elements::quantised;
 use dynocar_model::simulate::motion::{SimulatedMotion, advance};
 use dynocar_model::train::Davis;
+use dynocar_tests::chance::Chance;
 use nalgebra::{Matrix3, SMatrix, SVector};
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
 use crate::statistics::jacobian;
-use dynocar_tests::chance::Chance;
 
 /// Approximately the last row of table 1: w0 = 2.2 + 0.025 v + 0.0013 v² in N/kN, v in km/h.
 pub const THETA_KMH: [f64; 3] = [2.2, 0.025, 0.0013];

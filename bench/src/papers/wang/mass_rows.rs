@@ -4,15 +4,14 @@ use dynocar_core::pipeline::{Estimator, Outcome};
 use dynocar_estimators::wang::MassRegression;
 use dynocar_estimators::wang::line_resistance::LineResistance;
 use dynocar_model::force::ResolvedSample;
+use dynocar_tests::chance::Chance;
 
 use super::bound::{FisherInformation, mass_std_in_wind};
 use super::resistance_rows::{CROSSING, joint_least_squares};
 use super::ride::{kalman, known_resistance, leg, measure, presumed, staged, there_and_back, wind};
 use super::shuttle::{DisturbanceLaw, EMPTY_MASS_KG, Shuttle, calm};
-use crate::papers::row::PaperScore;
-use crate::papers::row::{PaperRow, Seeds, WANG};
+use crate::papers::row::{PaperRow, PaperScore, Seeds, WANG};
 use crate::statistics::mean;
-use dynocar_tests::chance::Chance;
 
 /// Mass in kg and published deviation in % of each line of Table 3.
 const TABLE_3: [(f64, f64); 3] = [(110_000.0, 2.45), (117_100.0, 3.08), (114_000.0, 2.55)];

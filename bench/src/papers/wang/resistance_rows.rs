@@ -10,15 +10,14 @@ use dynocar_estimators::wang::{
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_tests::chance::Chance;
 use nalgebra::Vector3;
 
 use super::bound::FisherInformation;
 use super::ride::measure;
 use super::shuttle::{Shuttle, ShuttleMoment, calm};
-use crate::papers::row::{PaperRow, Seeds, WANG};
-use crate::papers::row::{PaperScore, w0_errors};
+use crate::papers::row::{PaperRow, PaperScore, Seeds, WANG, w0_errors};
 use crate::statistics::{mean, root_mean_square};
-use dynocar_tests::chance::Chance;
 
 /// Samples of one crossing.
 pub const CROSSING: usize = 28_000;

@@ -12,6 +12,7 @@ use dynocar_model::simulate::elements::{autoregressed, quantised, shown, slewed}
 use dynocar_model::simulate::motion::deceleration_mps2;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
+use dynocar_tests::chance::Chance;
 
 use super::shuttle::{
     BRAKE_MAX_N, CURVE_RADIUS_M, DisturbanceLaw, EMPTY_MASS_KG, PERIOD_S, STATIONS_M, Shuttle,
@@ -19,7 +20,6 @@ use super::shuttle::{
 };
 use crate::rig::resolving;
 use crate::statistics::KMH;
-use dynocar_tests::chance::Chance;
 
 const SERVICE_BRAKE_MPS2: f64 = 0.7;
 

@@ -12,16 +12,15 @@ use dynocar_estimators::xia::trajectory::step::StepRule;
 use dynocar_estimators::xia::wolfe_newton::{NewtonSettings, RestartSource, wolfe_newton};
 use dynocar_model::force::mps2_per_n_per_kn;
 use dynocar_model::train::Davis;
+use dynocar_tests::chance::Chance;
 use nalgebra::{Matrix3, Vector3};
 
 use super::scenario::{
     CASES, DrivingProfile, NoiseFreeRun, ROTATING_MASS_FACTOR, SAMPLING_M, SPEED_NOISE_MPS,
     all_speeds_mps, bounds, disturbed_davis_covariance, drive, fast_speeds_mps,
 };
-use crate::papers::row::{PaperRow, Seeds, XIA};
-use crate::papers::row::{PaperScore, w0_std};
+use crate::papers::row::{PaperRow, PaperScore, Seeds, XIA, w0_std};
 use crate::statistics::{mean, root_mean_square};
-use dynocar_tests::chance::Chance;
 
 /// Data capacity I of the paper's window.
 const WINDOW: usize = 20;

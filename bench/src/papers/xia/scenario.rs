@@ -13,10 +13,10 @@ use dynocar_model::force::mps2_per_n_per_kn;
 use dynocar_model::simulate::elements::autoregressed;
 use dynocar_model::track::{Track, TrackCurve};
 use dynocar_model::train::Davis;
+use dynocar_tests::chance::Chance;
 use nalgebra::{DMatrix, Matrix3};
 
 use crate::statistics::{self, KMH};
-use dynocar_tests::chance::Chance;
 
 /// Mass in t.
 pub const MASS_T: f64 = 981.7;
