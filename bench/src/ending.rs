@@ -46,22 +46,9 @@ pub fn until_due<I: IntoIterator>(items: I) -> impl Iterator<Item = I::Item> {
     items.into_iter().take_while(|_| !is_due())
 }
 
-/// Does `work` on every case. It runs on `threads` new threads, not on rayon's, so that `work` itself may use rayon.
-/// Returns the results in the order of the cases.
-///
-/// # Panics
-///
-/// When the work does.
-pub fn over<C: Sync, R: Send>(
-    cases: &[C],
-    threads: usize,
-    work: impl Fn(&C) -> R + Sync,
-) -> Vec<R> {
-    over_while(cases, threads, work, || true)
-}
-
-/// Does the same, but begins no further case once the command is to end. Returns the results of the cases that were
-/// begun, the first ones.
+/// Does `work` on every case, but begins no further case once the command is to end. It runs on `threads` new threads,
+/// not on rayon's, so that `work` itself may use rayon. Returns the results of the cases that were begun, the first
+/// ones, in their order.
 ///
 /// # Panics
 ///
@@ -103,7 +90,7 @@ mod tests {
     fn every_case_is_worked_on_once_and_in_order() {
         for (count, threads) in [(0, 3), (1, 4), (7, 2), (50, 1)] {
             let cases: Vec<usize> = (0..count).collect();
-            assert_eq!(over(&cases, threads, |case| *case), cases);
+            assert_eq!(over_while(&cases, threads, |case| *case, || true), cases);
         }
     }
 

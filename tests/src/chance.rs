@@ -29,6 +29,11 @@ impl Chance {
         self.0.random()
     }
 
+    /// Returns a number drawn uniformly from `low` to `high`.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.uniform()
+    }
+
     /// Returns a number drawn uniformly from -1 to 1.
     pub fn either_way(&mut self) -> f64 {
         2.0 * self.uniform() - 1.0

@@ -197,7 +197,7 @@ impl Hidden {
         let sections = |count: usize, lengths_m: (f64, f64), random: &mut Chance| {
             let piece_m = end_m / count.max(1) as f64;
             let draw = |k: usize| {
-                let length_m = lengths_m.0 + (lengths_m.1 - lengths_m.0) * random.uniform();
+                let length_m = random.between(lengths_m.0, lengths_m.1);
                 let from_m = piece_m * k as f64 + 0.5 * random.uniform() * piece_m;
                 (from_m, from_m + length_m)
             };

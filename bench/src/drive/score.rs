@@ -200,14 +200,16 @@ fn line(service: &Service, (informant, name): (Informant, &str), drives: &Drives
 fn answer(service: &Service, index: usize, driven: &[DrivenRecord], stops: usize) -> Record {
     let scores: Vec<QuantityScore> = driven.iter().map(|it| it.scores[index].clone()).collect();
     let all = Scores(&scores);
-    let record = all
-        .usable(service.record().with("quantity", ASKED[index].name()))
+    let changes = all.count(|it| it.changes) as f64;
+    let record = service.record().with("quantity", ASKED[index].name());
+    record
+        .number("usable_percent", all.usable_percent(), 1)
         .number("wrong_percent", all.percent(|it| it.wrong), 2)
         .number("worse_than_declared_percent", all.percent(|it| it.worse), 1)
         .number("error_percent", all.rms_percent(|it| it.error_square), 1)
-        .number("declared_error_percent", all.rms_percent(|it| it.declared_square), 1);
-    let changes = all.count(|it| it.changes) as f64;
-    all.first_use(record).number("changes_per_stop", changes / stops.max(1) as f64, 1)
+        .number("declared_error_percent", all.rms_percent(|it| it.declared_square), 1)
+        .number("first_use_s", all.first_use_s(), 0)
+        .number("changes_per_stop", changes / stops.max(1) as f64, 1)
 }
 
 /// Compares the driver with Dynocar to the one with declared parameters.

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use dynocar_analysis::parallel::of_each_number;
 use dynocar_core::pipeline::Outcome;
 use dynocar_core::pipeline::braking::intake::BrakingCoefficient;
 use dynocar_core::pipeline::braking::settings::{
@@ -19,7 +20,6 @@ use super::braking::{
     train,
 };
 use super::row::{PaperRow, PaperScore, Seeds};
-use crate::ending;
 use crate::statistics::{mean, root_mean_square};
 
 /// Lag in s of our smoother.
@@ -96,8 +96,7 @@ fn coefficient(snapshot: &ParameterSnapshot) -> Option<(f64, f64)> {
 
 /// Runs `work` for every seed, on as many threads as the machine has.
 pub fn over_seeds<T: Send>(seeds: Seeds, work: impl Fn(u64) -> T + Sync) -> Vec<T> {
-    let threads = std::thread::available_parallelism().map_or(1, |count| count.get());
-    ending::over(&seeds.range().collect::<Vec<_>>(), threads, |&seed| work(seed))
+    of_each_number(seeds.count, |number| work(seeds.first + number as u64))
 }
 
 /// Errors of one estimator over all runs.

@@ -16,6 +16,7 @@ mod xie_and_jin;
 use std::path::PathBuf;
 
 use clap::Args;
+use clap::builder::RangedU64ValueParser;
 use dynocar::output::report_line;
 use serde_json::json;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -33,7 +34,8 @@ pub struct PapersArguments {
     #[arg(long)]
     quick: bool,
     /// Seeded runs behind each row
-    #[arg(long, default_value_t = 200, conflicts_with = "quick")]
+    #[arg(long, default_value_t = 200, conflicts_with = "quick",
+        value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
     seeds: usize,
     /// The first seed; another one shows whether the figures hold on runs never seen before
     #[arg(long, default_value_t = 0)]

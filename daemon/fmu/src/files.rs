@@ -36,15 +36,14 @@ impl ModelFile {
 #[derive(Clone, Debug)]
 pub struct DescriptionFiles {
     resources: String,
-    /// As they were set; empty for the FMU's own.
-    train: CString,
-    track: CString,
+    /// As they were set, by [`ModelFile`]; empty for the FMU's own.
+    paths: [CString; 2],
 }
 
 impl DescriptionFiles {
     /// Returns the FMU's own files at a location, as the simulator names it.
     pub fn from_resources(resources: String) -> Self {
-        DescriptionFiles { resources, train: CString::default(), track: CString::default() }
+        DescriptionFiles { resources, paths: Default::default() }
     }
 
     /// Returns where the FMU's own files are.
@@ -54,18 +53,12 @@ impl DescriptionFiles {
 
     /// Returns the path that was set.
     pub fn path(&self, file: ModelFile) -> &CStr {
-        match file {
-            ModelFile::Train => &self.train,
-            ModelFile::Track => &self.track,
-        }
+        &self.paths[file as usize]
     }
 
     /// Names another file.
     pub fn set(&mut self, file: ModelFile, path: &CStr) {
-        match file {
-            ModelFile::Train => self.train = path.into(),
-            ModelFile::Track => self.track = path.into(),
-        }
+        self.paths[file as usize] = path.into();
     }
 
     /// Returns the recommended estimators for this train on this line.
@@ -102,7 +95,8 @@ impl DescriptionFiles {
         let path = self.place(ModelFile::Train)?;
         let text = text_of(&path).map_err(|error| match error {
             ModelError::Unreadable { path, source }
-                if self.train.is_empty() && source.kind() == ErrorKind::NotFound =>
+                if self.path(ModelFile::Train).is_empty()
+                    && source.kind() == ErrorKind::NotFound =>
             {
                 ModelError::NoTrain(path)
             }
@@ -114,10 +108,12 @@ impl DescriptionFiles {
     /// `None` where no line was named and the FMU brings none along.
     fn read_track(&self) -> Result<Option<Track>, ModelError> {
         let path = match self.place(ModelFile::Track) {
-            Err(ModelError::NoFolder(_)) if self.track.is_empty() => return Ok(None),
+            Err(ModelError::NoFolder(_)) if self.path(ModelFile::Track).is_empty() => {
+                return Ok(None);
+            }
             place => place?,
         };
-        if self.track.is_empty() && !path.exists() {
+        if self.path(ModelFile::Track).is_empty() && !path.exists() {
             return Ok(None);
         }
         let text = text_of(&path)?;

@@ -81,7 +81,7 @@ impl SimulatorRandom {
 
     /// Uniform from `low` to `high`.
     pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.chance.uniform()
+        self.chance.between(low, high)
     }
 
     /// Returns the standard normal; both numbers of a pair are used.

@@ -99,8 +99,7 @@ pub fn measure(condition: RunCondition, seed: u64) -> Vec<Vec<MeasuredRun>> {
             let samples = speeds.iter().enumerate().filter_map(|(index, &true_kmh)| {
                 let mut speed_kmh = true_kmh + NOISE_KMH * random.normal();
                 if random.uniform() < condition.outlier_share {
-                    let (low, high) = OUTLIER_KMH;
-                    let size = low + (high - low) * random.uniform();
+                    let size = random.between(OUTLIER_KMH.0, OUTLIER_KMH.1);
                     speed_kmh += random.sign() * size;
                 }
                 let is_missing = random.uniform() < condition.missing_share;
