@@ -5,8 +5,9 @@ use dynocar_model::simulate::elements::{DeadTime, lagged};
 use super::driving::Controls;
 use super::train_maker::TrueTrain;
 
-/// Returns `value` moved towards a goal by at most `change`. Rounding may keep it from the goal itself, other than by
-/// [`slewed`](dynocar_model::simulate::elements::slewed): seeded datasets hold these numbers.
+/// Returns `value` moved towards a goal by at most `change`. Unlike
+/// [`elements::slewed`](dynocar_model::simulate::elements::slewed) it may miss the goal by rounding; the numbers of
+/// seeded datasets depend on that.
 pub(crate) fn slewed(value: f64, goal: f64, change: f64) -> f64 {
     value + (goal - value).clamp(-change, change)
 }

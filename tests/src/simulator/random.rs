@@ -84,7 +84,7 @@ impl SimulatorRandom {
         self.chance.between(low, high)
     }
 
-    /// Returns the standard normal; both numbers of a pair are used.
+    /// Returns a number drawn from the standard normal distribution; every second one completes a pair.
     pub fn gaussian(&mut self) -> f64 {
         if let Some(spare) = self.spare_gaussian.take() {
             return spare;

@@ -1,5 +1,5 @@
 //! Elements of a simulated train between its controller and its motion: how forces follow their commands, how
-//! disturbances change, and what sensors show. Whoever needs random numbers draws them and hands them over.
+//! disturbances change, and what sensors show. Random numbers are arguments.
 
 use std::collections::VecDeque;
 
@@ -11,13 +11,12 @@ pub struct DeadTime<T> {
 }
 
 impl<T: Copy> DeadTime<T> {
-    /// Returns a dead time of `delay_s`, rounded to whole steps. Until the first value arrives, that value counts as
-    /// sent for ever.
+    /// Returns a dead time of `delay_s`, rounded to whole steps. The first value counts as sent all the time before.
     pub fn new(delay_s: f64, step_s: f64) -> Self {
         DeadTime { waiting: VecDeque::new(), steps: (delay_s / step_s).round() as usize }
     }
 
-    /// Returns the same after a long time in which nothing but `initial` was sent.
+    /// Returns the same, with `initial` sent all the time before.
     pub fn steady(delay_s: f64, step_s: f64, initial: T) -> Self {
         let mut dead_time = DeadTime::new(delay_s, step_s);
         dead_time.waiting.extend(std::iter::repeat_n(initial, dead_time.steps));
@@ -50,8 +49,8 @@ pub fn slewed(value: f64, goal: f64, change: f64) -> f64 {
     goal.clamp(value - change, value + change)
 }
 
-/// Returns the next value of a first-order autoregression whose standard deviation stays `std`: `kept` of the value,
-/// and a standard normal deviate.
+/// Returns the next value of a first-order autoregression with the standard deviation `std`: the share `kept` of the
+/// value, and noise in proportion to a standard normal `deviate`.
 pub fn autoregressed(value: f64, kept: f64, std: f64, deviate: f64) -> f64 {
     kept * value + (1.0 - kept * kept).sqrt() * std * deviate
 }
@@ -61,8 +60,8 @@ pub fn quantised(value: f64, quantum: f64) -> f64 {
     (value / quantum).round() * quantum
 }
 
-/// Returns what a sensor shows of a quantity that is never negative: exactly 0 where that is 0, else its reading, which
-/// is not taken before.
+/// Returns what a sensor shows of a quantity that is never negative: exactly 0 where the quantity is 0, else the
+/// reading, but at least 0. Where it is 0, no reading is taken.
 pub fn shown(truth: f64, reading: impl FnOnce() -> f64) -> f64 {
     if truth > 0.0 { reading().max(0.0) } else { 0.0 }
 }
