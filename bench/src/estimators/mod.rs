@@ -1,9 +1,8 @@
-//! Time of an update of every estimator and every pipeline.
+//! Time of an update of every estimator and every pipeline. The pipelines, from sample to snapshot, and the filter of
+//! the mass go over a run of the demonstration dataset.
 //!
 //! - [`measure`]: rounds, medians, the table; another build of the program compared with this one
 //! - [`resistance`], [`braking`]: parts of estimators
-//!
-//! The pipelines, from sample to snapshot, and the filter of the mass go over a run of the demonstration dataset.
 
 pub mod braking;
 pub mod measure;

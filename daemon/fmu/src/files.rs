@@ -1,5 +1,5 @@
-//! What an instance is given: inputs during a step, with their slopes where they are given; the folder where the FMU
-//! was unpacked, the files that describe train and line, and the models for them.
+//! Inputs during a step, with their slopes where they are given; the folder where the FMU was unpacked, the files that
+//! describe train and line, and the models for them.
 
 use std::ffi::{CStr, CString, OsString};
 use std::io::ErrorKind;

@@ -1,5 +1,5 @@
 //! Elements of a simulated train between its controller and its motion: how forces follow their commands, how
-//! disturbances change, and what sensors show. Random numbers are arguments.
+//! disturbances change, and the readings of sensors. Random numbers are arguments.
 
 use std::collections::VecDeque;
 
@@ -60,8 +60,8 @@ pub fn quantised(value: f64, quantum: f64) -> f64 {
     (value / quantum).round() * quantum
 }
 
-/// Returns what a sensor shows of a quantity that is never negative: exactly 0 where the quantity is 0, else the
-/// reading, but at least 0. Where it is 0, no reading is taken.
+/// Returns the value that a sensor shows of a quantity that is never negative: exactly 0 where the quantity is 0, else
+/// the reading, but at least 0. Where it is 0, no reading is taken.
 pub fn shown(truth: f64, reading: impl FnOnce() -> f64) -> f64 {
     if truth > 0.0 { reading().max(0.0) } else { 0.0 }
 }
