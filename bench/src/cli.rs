@@ -55,13 +55,14 @@ pub fn main() -> ExitCode {
         Ok(arguments) => arguments,
         Err(status) => return status,
     };
-    if let Command::Peer(arguments) = &arguments.command {
-        return status(serve(arguments));
-    }
-    status(ending::begin().and_then(|()| run(&arguments.command)))
+    status(run(&arguments.command))
 }
 
 fn run(command: &Command) -> Result<(), BenchError> {
+    // A peer ends when it is killed.
+    if !matches!(command, Command::Peer(_)) {
+        ending::begin()?;
+    }
     match command {
         Command::Brakes(arguments) => arguments.run(),
         Command::Drive(arguments) => arguments.run(),

@@ -2,21 +2,19 @@
 //!
 //! - [`cli`]: the commands of `dynocar-bench`
 //! - `drive`: the gain of an automatic driver
-//! - `ending`: Ctrl-C, in every command
+//! - `ending`: Ctrl-C, in every command, and the same work over many cases until then
 //! - `estimators`: time of an update of every estimator and pipeline
 //! - `explain`: the search for undeclared effects on simulated datasets
 //! - `latency`: sample → snapshot through real processes, compared with the floor and alternatives
 //! - `load`: many trains against one daemon
 //! - `open_loop`: the open loop of `latency` and `load`
-//! - `rig`: processes, cores, pipelines and histograms
+//! - `rig`: processes, cores and pipelines
 //! - `monitor`: suspicions of the residual monitor on simulated driving, their delay and false alarms
 //! - `papers`: accuracy of every estimator over seeded runs, compared with the statistical bound
 //! - [`scenarios`](mod@scenarios): resistance and mass in a user's day
 //! - `survey`: how the work of a survey grows with passes
 //! - [`output`]: results for people and for machines, and failures
-//! - `parallel`: the same work over many cases, on some threads
-//! - `statistics`: means and quantiles over seeded runs
-//! - `chance`: random numbers
+//! - `statistics`: means and quantiles over seeded runs, histograms
 //!
 //! # Examples
 //!
@@ -27,7 +25,6 @@
 //! ```
 
 mod brakes;
-mod chance;
 pub mod cli;
 mod drive;
 mod ending;
@@ -39,7 +36,6 @@ mod monitor;
 mod open_loop;
 pub mod output;
 mod papers;
-mod parallel;
 mod rig;
 pub mod scenarios;
 mod statistics;

@@ -9,13 +9,11 @@ use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::identify::{identify, published_samples};
 use dynocar_estimators::EstimatorSettings;
 use dynocar_fmu::estimators::PIPELINES;
-use dynocar_fmu::ffi::Status;
 use dynocar_fmu::ffi::instance::CO_SIMULATION;
-use dynocar_fmu::ffi::life::{
-    fmi2CancelStep, fmi2EnterInitializationMode, fmi2ExitInitializationMode, fmi2Reset,
-    fmi2SetupExperiment, fmi2Terminate,
+use dynocar_fmu::ffi::{
+    Status, fmi2CancelStep, fmi2EnterInitializationMode, fmi2ExitInitializationMode, fmi2GetReal,
+    fmi2Reset, fmi2SetReal, fmi2SetupExperiment, fmi2Terminate,
 };
-use dynocar_fmu::ffi::values::{fmi2GetReal, fmi2SetReal};
 use dynocar_fmu::variables::{Kind, Meaning, SnapshotField};
 use dynocar_fmu::{ESTIMATORS, INTERFACES};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId};

@@ -3,6 +3,7 @@
 //! # Layout
 //!
 //! - [`browser`]: a headless browser that reports the state of a page
+//! - [`chance`]: random numbers of simulators and measurements
 //! - [`documents`]: the pages, their links and the commands that they show
 //! - [`fuzz`]: mutations of a corpus, given to every reader of foreign bytes
 //! - [`golden`]: estimates of every estimator from the demo's recorded runs, bit for bit; default estimators, with
@@ -16,6 +17,7 @@
 //! - [`tram`]: a tram from stop to stop
 
 pub mod browser;
+pub mod chance;
 pub mod documents;
 pub mod fuzz;
 pub mod golden;

@@ -1,5 +1,6 @@
 //! Failures of sensors and channels, applied to good samples.
 
+use dynocar_model::simulate::elements::quantised;
 use dynocar_shared::{SampleField, TrainSample};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -104,7 +105,7 @@ impl SensorFailure {
             _ => {
                 for (field, step) in fields.into_iter().zip([1.0, 20_000.0, 20_000.0]) {
                     if let Some(value) = sample.get(field) {
-                        sample.set(field, (value / step).round() * step);
+                        sample.set(field, quantised(value, step));
                     }
                 }
             }

@@ -1,9 +1,12 @@
 //! Samples of a tram from stop to stop: an electric brake with a limited change of force, then a friction brake that
 //! follows its report late.
 
+use dynocar_model::simulate::elements::{lagged_explicitly, shown};
+use dynocar_model::simulate::motion::deceleration_mps2;
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
+use crate::simulator::actuators::slewed;
 use crate::simulator::random::{SimulatorRandom, Stream};
 
 /// Samples per second.
@@ -69,7 +72,7 @@ pub fn samples(seed: u64, duration_s: u32) -> Vec<TrainSample> {
     for cycle in 0..u64::from(duration_s * RATE_HZ) {
         for _ in 0..10 {
             let to_stop_m: f64 = next_m - place_m;
-            let needed_mps2 = speed_mps * speed_mps / (2.0 * to_stop_m.max(0.3));
+            let needed_mps2 = deceleration_mps2((speed_mps, 0.0), to_stop_m.max(0.3));
             let (wanted_n, wanted_friction_n) = if left_s > 0.0 {
                 left_s -= step_s;
                 (0.0, if left_s > 0.0 { HOLDING_N } else { 0.0 })
@@ -82,10 +85,9 @@ pub fn samples(seed: u64, duration_s: u32) -> Vec<TrainSample> {
             } else {
                 (0.0, 0.0)
             };
-            let most_n = JERK_NPS * step_s;
-            electric_n += (wanted_n - electric_n).clamp(-most_n, most_n);
+            electric_n = slewed(electric_n, wanted_n, JERK_NPS * step_s);
             reported_n = wanted_friction_n;
-            friction_n += (reported_n - friction_n) * (step_s / FRICTION_LAG_S).min(1.0);
+            friction_n = lagged_explicitly(friction_n, reported_n, step_s, FRICTION_LAG_S);
             let weight_kn = 1e-3 * GRAVITY_MPS2 * LOADED_KG;
             let resists = 5.0 + 0.06 * speed_mps + 0.0048 * speed_mps * speed_mps;
             let gradient = 0.5
@@ -105,8 +107,7 @@ pub fn samples(seed: u64, duration_s: u32) -> Vec<TrainSample> {
         sample.sequence = cycle + 1;
         sample.time_ns = 1_000_000_000 + (cycle as i64 + 1) * 1_000_000_000 / i64::from(RATE_HZ);
         let noise_mps = 0.008 * random.gaussian();
-        let seen_mps = if speed_mps > 0.0 { (speed_mps + noise_mps).max(0.0) } else { 0.0 };
-        sample.set(SampleField::Speed, seen_mps);
+        sample.set(SampleField::Speed, shown(speed_mps, || speed_mps + noise_mps));
         sample.set(SampleField::Position, place_m + 0.5 * random.gaussian());
         sample.set(SampleField::TractionForce, 1.006 * electric_n.max(0.0));
         sample.set(SampleField::BrakeForce, 1.01 * (reported_n - electric_n.min(0.0)));

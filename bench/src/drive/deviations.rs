@@ -4,9 +4,9 @@ use dynocar_core::pipeline::braking::intake::DeclaredGear;
 use dynocar_model::train::{BrakeGear, EffortCurve, TrainModel};
 use dynocar_shared::stopping::RailAdhesion;
 use dynocar_shared::{RailCondition, Uncertain};
+use dynocar_tests::chance::Chance;
 
 use super::knowledge::Ability;
-use crate::chance::Chance;
 use crate::output::Record;
 use crate::scenarios::brake::Brake;
 use crate::scenarios::world::{LoadSource, Mistakes, Scenario, Traffic, World};
@@ -197,7 +197,7 @@ impl Hidden {
         let sections = |count: usize, lengths_m: (f64, f64), random: &mut Chance| {
             let piece_m = end_m / count.max(1) as f64;
             let draw = |k: usize| {
-                let length_m = lengths_m.0 + (lengths_m.1 - lengths_m.0) * random.uniform();
+                let length_m = random.between(lengths_m.0, lengths_m.1);
                 let from_m = piece_m * k as f64 + 0.5 * random.uniform() * piece_m;
                 (from_m, from_m + length_m)
             };

@@ -6,9 +6,10 @@
 //! computed for the place and speed at which it will act. When the parameters change, the estimate changes with them,
 //! so that the force does not jump.
 
-use super::braking::BrakingCurve;
+use dynocar_model::simulate::elements::slewed;
+
 use super::knowledge::{Ability, Knowledge};
-use super::plan::{COASTING_MIN_SHARE, DrivePlan, PlannedLeg, Planner};
+use super::plan::{BrakingCurve, COASTING_MIN_SHARE, DrivePlan, PlannedLeg, Planner};
 
 /// Greatest bandwidth in rad/s of the estimates of the speed and of the unexplained acceleration.
 const OBSERVER_RAD_PER_S: f64 = 0.8;
@@ -118,8 +119,7 @@ impl LegDriver {
         let (at_m, speed_mps) = self.ahead();
         let wanted_mps2 = self.wanted_mps2(at_m, speed_mps);
         let most_mps2 = self.ability.jerk_mps3 * self.cycle_s;
-        let before_mps2 = self.commanded_mps2;
-        self.commanded_mps2 = wanted_mps2.clamp(before_mps2 - most_mps2, before_mps2 + most_mps2);
+        self.commanded_mps2 = slewed(self.commanded_mps2, wanted_mps2, most_mps2);
         let slope = self.leg.slope_permille(at_m);
         let explained_mps2 = self.commanded_mps2 - self.unexplained_mps2;
         let free_n = self.knowledge.force_n(explained_mps2, speed_mps, slope);

@@ -13,14 +13,11 @@
 //! - [`run`]: all trains of a service with one kind of parameters
 //! - [`score`], [`picture`]: the result
 
-pub mod answers;
-pub mod braking;
 pub mod deviations;
 pub mod driver;
 pub mod journey;
 pub mod knowledge;
 pub mod link;
-pub mod picture;
 pub mod plan;
 pub mod run;
 pub mod score;
@@ -35,11 +32,11 @@ use serde_json::json;
 use self::deviations::{CONDITIONS, ORDINARY, Service};
 use self::run::{DriveExtent, Informant};
 use self::score::Scored;
+use crate::ending;
 use crate::output::{
     BenchError, OutputArguments, Record, containing, expect, expect_none, table, write_csv,
 };
 use crate::scenarios::world::Traffic;
-use crate::{ending, parallel};
 
 /// Measures the gain of a controller: an automatic driver with declared parameters, with the daemon's answers, and
 /// with the true ones.
@@ -98,12 +95,12 @@ impl DriveArguments {
             format!("--cycle-ms {cycle_ms}: expected 10 to 200")
         })?;
         let mut scored =
-            parallel::until_due(&chosen, self.threads, |service| measure(*service, extent));
+            ending::over_until_due(&chosen, self.threads, |service| measure(*service, extent));
         // Those whose processes the same signal ended are not whole.
         scored.retain(|it| it.is_ok() || !ending::is_due());
         let scored = scored.into_iter().collect::<Result<Vec<Scored>, _>>()?;
         if let Some(file) = &self.picture {
-            write_file(file, &picture::svg(&ordinary(&scored))?)?;
+            write_file(file, &score::picture(&ordinary(&scored))?)?;
         }
         let lines = scored.iter().flat_map(|it| &it.lines).map(|line| line.record.clone());
         let answers = scored.iter().flat_map(|it| it.answers.clone());

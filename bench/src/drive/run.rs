@@ -3,10 +3,9 @@
 use clap::Args;
 use dynocar_shared::TrainSample;
 
-use super::answers::{self, ASKED, AnswerMemory};
 use super::deviations::Service;
 use super::journey::{DrivenLeg, Journey};
-use super::link::Link;
+use super::link::{self, ASKED, AnswerMemory, Link};
 use super::train::Train;
 use crate::ending;
 use crate::output::BenchError;
@@ -68,12 +67,12 @@ impl Driving {
         let declared = self.journey.declared(sample);
         let is_usable = ASKED.map(|quantity| link.usable(train, quantity).is_some());
         let friction = self.journey.train.gear.friction;
-        let learned = answers::learned(&declared, friction, sample.speed_mps, |quantity| {
+        let learned = link::learned(&declared, friction, sample.speed_mps, |quantity| {
             link.usable(train, quantity)
         });
         let is_braking = self.journey.is_braking();
         let train = &self.journey.train;
-        answers::count(&mut self.scores, train, is_braking, &declared, &learned, is_usable);
+        link::count(&mut self.scores, train, is_braking, &declared, &learned, is_usable);
         let known = self.memory.recall(&learned, is_usable, is_braking);
         self.journey.proceed(sample, &known, &learned);
     }

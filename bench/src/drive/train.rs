@@ -1,18 +1,17 @@
 //! The simulated train: its motion under a force, and the readings of its sensors. No estimator sees its true
 //! parameters.
 
-use std::collections::VecDeque;
-
 use dynocar_core::pipeline::braking::intake::DeclaredGear;
+use dynocar_model::simulate::elements::{DeadTime, shown};
 use dynocar_model::simulate::motion::{SimulatedMotion, advance};
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainId, TrainSample, Uncertain};
+use dynocar_tests::chance::Chance;
 
 use super::deviations::{Hidden, Service, ability, declared_gear, next_load_kg};
 use super::knowledge::{Ability, Knowledge};
 use super::plan::{PIECE_M, PlannedLeg};
-use crate::chance::Chance;
 use crate::scenarios::world::{LoadSource, Mistakes, WEIGHING_STD, World};
 
 /// Longest step of the simulation in s.
@@ -21,6 +20,12 @@ const STEP_MAX_S: f64 = 0.02;
 const BALISE_STD_M: f64 = 0.08;
 /// Mean time in s by which forces act later than they are reported.
 const MEAN_DELAY_S: f64 = Mistakes::USUAL.mean_delay_s;
+
+/// Returns the simulation's steps in a cycle, and the length of a step in s.
+fn steps(service: &Service) -> (usize, f64) {
+    let count = (service.cycle_s() / STEP_MAX_S).ceil();
+    (count as usize, service.cycle_s() / count)
+}
 
 /// A train on its line.
 pub struct Train {
@@ -45,9 +50,9 @@ pub struct Train {
     weighed_kg: f64,
     brake_scale: f64,
     balise_m: f64,
-    /// Reported traction minus brake force in N, and the reported forces that do not act yet.
+    /// Reported traction minus brake force in N, and how late it acts.
     reported_n: f64,
-    on_its_way_n: VecDeque<f64>,
+    dead_time: DeadTime<f64>,
     cycles: u64,
     /// Work in J of the traction at the rims since the last stop.
     pub energy_j: f64,
@@ -77,7 +82,7 @@ impl Train {
             brake_scale: 1.0,
             balise_m: 0.0,
             reported_n: 0.0,
-            on_its_way_n: VecDeque::new(),
+            dead_time: DeadTime::new(world.delay_s, steps(&service).1),
             cycles: 0,
             energy_j: 0.0,
             legs: 0,
@@ -203,20 +208,13 @@ impl Train {
 
     /// One cycle under a commanded force in N, braking negative; gives the acceleration in m/s² at its end.
     pub fn apply(&mut self, commanded_n: f64) -> f64 {
-        let cycle_s = self.service.cycle_s();
-        let steps = (cycle_s / STEP_MAX_S).ceil();
-        let step_s = cycle_s / steps;
+        let (steps, step_s) = steps(&self.service);
         // The reported force follows the command; the rest of the lag is the mean delay.
         let follow = 1.0 - (-step_s / (self.ability.lag_s - MEAN_DELAY_S)).exp();
-        let late = (self.world.delay_s / step_s).round() as usize;
         let mut acceleration = 0.0;
-        for _ in 0..steps as usize {
+        for _ in 0..steps {
             self.reported_n += follow * (commanded_n - self.reported_n);
-            self.on_its_way_n.push_back(self.reported_n);
-            while self.on_its_way_n.len() > late + 1 {
-                self.on_its_way_n.pop_front();
-            }
-            let acting_n = self.on_its_way_n[0];
+            let acting_n = self.dead_time.pass(self.reported_n);
             let before = self.motion;
             self.motion = advance(before, step_s, |_, at| self.acceleration_mps2(acting_n, at));
             acceleration = (self.motion.speed_mps - before.speed_mps) / step_s;
@@ -240,13 +238,9 @@ impl Train {
     /// Returns the sample that the controller measures and writes.
     pub fn sample(&mut self) -> TrainSample {
         let World { scenario, speed_scale, .. } = &self.world;
-        let speed_mps = match self.motion.speed_mps > 0.0 {
-            true => {
-                let noise_mps = scenario.speed_noise_mps * self.random.normal();
-                (speed_scale * self.motion.speed_mps + noise_mps).max(0.0)
-            }
-            false => 0.0,
-        };
+        let speed_mps = shown(self.motion.speed_mps, || {
+            speed_scale * self.motion.speed_mps + scenario.speed_noise_mps * self.random.normal()
+        });
         let noise_m = scenario.position_noise_m * self.random.normal();
         let place_m = self.chainage_m() + self.balise_m + noise_m;
         let mut sample = TrainSample::empty(TrainId(1));

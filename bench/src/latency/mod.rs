@@ -5,11 +5,9 @@
 //! machine falls on all of them alike. Ratios to the floor, an echo on the daemon's channels without an estimator, are
 //! taken within a round; the median of the rounds is reported.
 //!
-//! - [`case`]: cases that are measured together, and the other readers of their channels
 //! - [`costs`]: one poll and one publish
-//! - [`report`]: the result, in numbers and as a picture
+//! - [`report`]: cases that are measured together, and the result, in numbers and as a picture
 
-pub mod case;
 pub mod costs;
 pub mod report;
 
@@ -19,14 +17,13 @@ use clap::Args;
 use dynocar::config::IdleStrategy;
 use dynocar::output::report_line;
 
-use self::case::LatencyCase;
-use self::report::{MeasuredCase, Rounds};
-use crate::chance::Chance;
+use self::report::{LatencyCase, MeasuredCase, Rounds};
 use crate::ending;
 use crate::open_loop::traffic::TrafficPlan;
 use crate::open_loop::trial::{Extent, run};
 use crate::output::{BenchError, OutputArguments, expect};
 use crate::rig::cores::{CoreArguments, Cores, bind, in_thread, prioritise};
+use dynocar_tests::chance::Chance;
 
 /// Sample → snapshot through real processes, compared with the floor and with alternatives.
 #[derive(Debug, Args)]
@@ -94,12 +91,12 @@ impl LatencyArguments {
             cores,
             seed: self.place.seed,
         };
-        let mut cases = case::cases(self.quick);
+        let mut cases = report::cases(self.quick);
         if self.readers {
-            cases.extend(case::cases_with_readers());
+            cases.extend(report::cases_with_readers());
         }
         if self.shadow {
-            cases.extend(case::cases_in_shadow());
+            cases.extend(report::cases_in_shadow());
         }
         let text = self.case.as_deref().unwrap_or_default();
         cases.retain(|case| case.name == "floor" || case.name.contains(text));

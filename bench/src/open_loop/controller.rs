@@ -11,8 +11,8 @@ use hdrhistogram::Histogram;
 use super::traffic::LoopTraffic;
 use super::wire::BenchTransport;
 use crate::output::BenchError;
-use crate::rig::quantiles::{histogram, record};
 use crate::rig::site::require;
+use crate::statistics::{histogram, record};
 
 /// Number of samples in flight that are distinguished; at 10 kHz those of more than a second.
 const IN_FLIGHT: usize = 1 << 14;

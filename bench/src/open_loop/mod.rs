@@ -2,16 +2,14 @@
 //! missing, through real processes on cores of their own.
 //!
 //! - [`traffic`]: a train's samples, when they leave, and which are bad
-//! - [`wire`]: the controller's end of each transport
+//! - [`wire`]: the controller's end of each transport, and the alternatives to shared memory
 //! - [`controller`]: sends the samples that are due, and counts the answers
 //! - [`trial`]: the answering side, the number of trains, and the outcome
 //! - [`server`]: the answering processes
-//! - [`sockets`]: the alternatives to shared memory
 //! - `zeromq`: ZeroMQ, with the feature of that name
 
 pub mod controller;
 pub mod server;
-pub mod sockets;
 pub mod traffic;
 pub mod trial;
 pub mod wire;

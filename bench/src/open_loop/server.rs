@@ -8,8 +8,7 @@ use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};
 use dynocar_transport::channel::Transport;
 use dynocar_transport::{Host, monotonic_now_ns};
 
-use super::sockets::{self, Datagrams, SocketEnd, TRAIN};
-use super::wire;
+use super::wire::{self, Datagrams, SocketEnd, TRAIN};
 use crate::output::BenchError;
 use crate::rig::cores::{bind, prioritise};
 
@@ -64,14 +63,14 @@ pub fn serve(arguments: &PeerArguments) -> Result<(), BenchError> {
         PeerKind::UnixDatagram => {
             let socket = Datagrams::open(place, SocketEnd::Server, *blocks)?;
             pin();
-            sockets::serve(place, socket)
+            wire::serve(place, socket)
         }
         #[cfg(feature = "zeromq")]
         PeerKind::Zeromq => {
             // The library's threads are not bound.
             let socket = super::zeromq::ZeroMq::open(place, SocketEnd::Server, *blocks)?;
             pin();
-            sockets::serve(place, socket)
+            wire::serve(place, socket)
         }
     }
 }

@@ -4,8 +4,7 @@ use std::f64::consts::TAU;
 
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
-
-use crate::chance::Chance;
+use dynocar_tests::chance::Chance;
 
 /// The traffic of every train.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -167,9 +166,10 @@ impl DrivenMotion {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use dynocar_core::pipeline::admission::Admission;
     use dynocar_model::train::{Davis, TrainModel};
+
+    use super::*;
 
     const TRAIN: TrainId = TrainId(2);
 

@@ -10,13 +10,12 @@ use dynocar_tests::process::{DaemonSite, Process};
 use dynocar_transport::monotonic_now_ns;
 
 use super::controller::{Controller, TrialOutcome, drive, settle};
-use super::sockets::{Datagrams, SocketEnd, TRAIN};
 use super::traffic::{LoopTraffic, TrafficPlan};
-use super::wire::{BenchTransport, Client, Notifying};
+use super::wire::{BenchTransport, Client, Datagrams, Notifying, SocketEnd, TRAIN};
 use crate::output::{BenchError, during};
-use crate::rig::cores::{Cores, bind, prioritise};
+use crate::rig::cores::{Cores, bind, prioritise, process_usage};
 use crate::rig::site::{DaemonPlan, ThreadPlan, peer, put_candidates, require, site, stop};
-use crate::rig::{pipelines, usage};
+use crate::rig::slow_pipelines;
 
 /// The answering side.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -185,7 +184,7 @@ fn measure(
     drive(controllers, &mut uncounted, after(start_ns, extent.warm_up_s), is_over)?;
     settle(controllers, &mut uncounted)?;
     require(peer)?;
-    let usage = || (usage::of(peer.id(), FAST), monotonic_now_ns());
+    let usage = || (process_usage(peer.id(), FAST), monotonic_now_ns());
     let (early, early_ns) = usage();
     let start_ns = begin(controllers, extent.seconds);
     let publisher_lag_ns =
@@ -260,7 +259,7 @@ impl Setting {
 
     /// Fast pipelines share a thread on the daemon's core; slow ones share another one.
     fn threads(&self, pipelines: &[PipelineKind], cores: Cores) -> Vec<ThreadPlan> {
-        let slow_kinds = pipelines::slow();
+        let slow_kinds = slow_pipelines();
         let (slow, fast): (Vec<_>, Vec<_>) =
             pipelines.iter().partition(|kind| slow_kinds.contains(kind));
         let thread = |name, core, priority, pipelines: Vec<PipelineKind>| {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::sockets::{BLOCK, Socket, SocketEnd};
+use super::wire::{BLOCK, Socket, SocketEnd};
 use crate::output::BenchError;
 
 /// An end of a pair socket.

@@ -9,8 +9,8 @@ use dynocar_core::pipeline::braking::intake::{BrakingCoefficient, DeclaredGear};
 use dynocar_core::pipeline::braking::settings::WalkSettings;
 use dynocar_model::train::{BrakeGear, Davis, TrainModel};
 use dynocar_shared::RailCondition;
+use dynocar_tests::chance::Chance;
 
-use crate::chance::Chance;
 use crate::statistics::KMH;
 
 /// Time in s between two measurements.

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use dynocar_analysis::parallel::of_each_number;
 use dynocar_core::pipeline::Outcome;
 use dynocar_core::pipeline::braking::intake::BrakingCoefficient;
 use dynocar_core::pipeline::braking::settings::{
@@ -18,9 +19,7 @@ use super::braking::{
     Braking, BrakingMoment, PRESSURE_PA, SPEED_NOISE_MPS, STEP_S, ShareStep, WINDOW, disc_friction,
     train,
 };
-use super::row::{PaperRow, Seeds};
-use super::score;
-use crate::parallel;
+use super::row::{PaperRow, PaperScore, Seeds};
 use crate::statistics::{mean, root_mean_square};
 
 /// Lag in s of our smoother.
@@ -97,14 +96,13 @@ fn coefficient(snapshot: &ParameterSnapshot) -> Option<(f64, f64)> {
 
 /// Runs `work` for every seed, on as many threads as the machine has.
 pub fn over_seeds<T: Send>(seeds: Seeds, work: impl Fn(u64) -> T + Sync) -> Vec<T> {
-    let threads = std::thread::available_parallelism().map_or(1, |count| count.get());
-    parallel::over(&seeds.range().collect::<Vec<_>>(), threads, |&seed| work(seed))
+    of_each_number(seeds.count, |number| work(seeds.first + number as u64))
 }
 
 /// Errors of one estimator over all runs.
 #[derive(Clone, Debug)]
 pub struct BrakingScore {
-    errors: score::PaperScore,
+    errors: PaperScore,
     /// Mean of |error| / truth in %.
     pub relative_percent: f64,
     /// Mean of (error / claimed standard deviation)² of each run.
@@ -151,7 +149,7 @@ impl BrakingScore {
     /// Returns the errors of runs, pooled.
     pub fn from_runs<'a>(runs: impl Iterator<Item = &'a Vec<ScoredBraking>>) -> Self {
         let (mut errors, mut relative, mut nees_of_runs) =
-            (score::PaperScore::default(), Vec::new(), Vec::new());
+            (PaperScore::default(), Vec::new(), Vec::new());
         for run in runs.filter(|run| !run.is_empty()) {
             nees_of_runs.push(mean(run.iter().map(|it| (it.error / it.std).powi(2))));
             relative.extend(run.iter().map(|it| 100.0 * (it.error / it.truth).abs()));

@@ -3,6 +3,8 @@
 
 use std::ops::Range;
 
+use dynocar_model::simulate::elements::lagged_explicitly;
+
 /// Report of the brake by the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BrakeReport {
@@ -97,8 +99,8 @@ impl Friction {
     pub fn acts_mps2(&mut self, brake: &Brake, told_mps2: f64, speed_mps: f64, step_s: f64) -> f64 {
         let braked_mps2 = (-told_mps2).max(0.0);
         let share = brake.friction_share(speed_mps);
-        let follows = if brake.lag_s > 0.0 { (step_s / brake.lag_s).min(1.0) } else { 1.0 };
-        self.by_pressure_mps2 += follows * (share * braked_mps2 - self.by_pressure_mps2);
+        self.by_pressure_mps2 =
+            lagged_explicitly(self.by_pressure_mps2, share * braked_mps2, step_s, brake.lag_s);
         told_mps2.max(0.0) - (1.0 - share) * braked_mps2 - brake.strength * self.by_pressure_mps2
     }
 

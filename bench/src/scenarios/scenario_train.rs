@@ -1,7 +1,7 @@
 //! Driving from stop to stop, and the samples that the controller writes.
 
-use std::collections::VecDeque;
-
+use dynocar_model::simulate::elements::{DeadTime, shown, slewed};
+use dynocar_model::simulate::motion::deceleration_mps2;
 use dynocar_model::train::Davis;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
@@ -46,6 +46,11 @@ pub struct DriveMoment {
     pub gust: (usize, f64),
 }
 
+/// Returns the controller's cycle in s.
+fn cycle_s(world: &World) -> f64 {
+    1.0 / f64::from(world.scenario.rate_hz)
+}
+
 /// A train on its leg.
 pub struct ScenarioTrain {
     world: World,
@@ -60,9 +65,9 @@ pub struct ScenarioTrain {
     /// As demanded, before the limit of jerk.
     demanded_mps2: f64,
     friction: Friction,
-    /// The reported acceleration, and the reported values that do not act yet.
+    /// The reported acceleration, and how late it acts.
     reported_mps2: f64,
-    on_its_way: VecDeque<f64>,
+    dead_time: DeadTime<f64>,
     /// Step within a cycle at which a command acts.
     acts_at: u32,
     /// Exerted brake force over the assumed one, on this leg.
@@ -98,7 +103,7 @@ impl ScenarioTrain {
             demanded_mps2: 0.0,
             friction: Friction::default(),
             reported_mps2: 0.0,
-            on_its_way: VecDeque::new(),
+            dead_time: DeadTime::new(world.delay_s, cycle_s(&world) / f64::from(STEPS)),
             acts_at,
             brake_scale: 1.0,
             gusts_mps: [0.0; 2],
@@ -146,7 +151,7 @@ impl ScenarioTrain {
 
     /// One cycle on.
     pub fn advance(&mut self) -> DriveMoment {
-        let cycle_s = 1.0 / f64::from(self.world.scenario.rate_hz);
+        let cycle_s = cycle_s(&self.world);
         self.command(cycle_s);
         self.blow(cycle_s);
         let step_s = cycle_s / f64::from(STEPS);
@@ -158,13 +163,9 @@ impl ScenarioTrain {
                 let share = f64::from(step + 1) / f64::from(STEPS);
                 from_mps2 + share * (self.commanded_mps2 - from_mps2)
             };
-            self.on_its_way.push_back(self.reported_mps2);
-            let late = (self.world.delay_s / step_s).round() as usize;
-            while self.on_its_way.len() > late + 1 {
-                self.on_its_way.pop_front();
-            }
             let brake = &self.world.scenario.brake;
-            let (told_mps2, speed_mps) = (self.on_its_way[0], self.now.speed_mps);
+            let told_mps2 = self.dead_time.pass(self.reported_mps2);
+            let speed_mps = self.now.speed_mps;
             let acts_mps2 = self.friction.acts_mps2(brake, told_mps2, speed_mps, step_s);
             let before_mps2 = std::mem::replace(&mut self.now.push_mps2, acts_mps2);
             self.step(step_s, 0.5 * (before_mps2 + self.now.push_mps2));
@@ -199,7 +200,7 @@ impl ScenarioTrain {
         self.demanded_mps2 = self.commanded_mps2;
         if !self.world.scenario.jumps {
             let most = self.world.scenario.brake.jerk_mps3 * cycle_s;
-            self.commanded_mps2 = self.commanded_mps2.clamp(before_mps2 - most, before_mps2 + most);
+            self.commanded_mps2 = slewed(before_mps2, self.commanded_mps2, most);
         }
     }
 
@@ -207,7 +208,7 @@ impl ScenarioTrain {
         let (most, brake) = self.habits.acceleration_mps2;
         let to_stop_m =
             self.now.direction * (self.world.stops_m[self.next_stop] - self.now.place_m);
-        let needed = self.now.speed_mps * self.now.speed_mps / (2.0 * to_stop_m.max(0.5));
+        let needed = deceleration_mps2((self.now.speed_mps, 0.0), to_stop_m.max(0.5));
         if needed >= brake && !matches!(self.phase, Phase::Standing { .. }) {
             self.phase = Phase::Braking;
         }
@@ -298,10 +299,7 @@ impl ScenarioTrain {
         let force_n = self.reported_mps2 * inertial_kg;
         let noise_mps = scenario.speed_noise_mps * random.normal();
         let place_m = now.place_m + scenario.position_noise_m * random.normal();
-        let measured_mps = match now.speed_mps > 0.0 {
-            true => (*speed_scale * now.speed_mps + noise_mps).max(0.0),
-            false => 0.0,
-        };
+        let measured_mps = shown(now.speed_mps, || *speed_scale * now.speed_mps + noise_mps);
         let braked = force_scale[1] / self.brake_scale;
         let sample = &mut now.sample;
         sample.sequence += 1;

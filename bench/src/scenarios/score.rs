@@ -2,7 +2,6 @@
 
 use dynocar_shared::{HALF_95, Uncertain};
 
-use crate::output::Record;
 use crate::statistics::median;
 
 /// Speed in m/s from which an answer counts.
@@ -150,28 +149,27 @@ impl Scores<'_> {
         self.0.iter().map(of).sum()
     }
 
-    /// With the share of the time in which the answer was usable.
-    pub fn usable(&self, record: Record) -> Record {
+    /// Returns the share of the time in which the answer was usable, in %.
+    pub fn usable_percent(&self) -> f64 {
         let share = self.count(|it| it.usable) as f64 / self.count(|it| it.cycles).max(1) as f64;
-        record.number("usable_percent", 100.0 * share, 1)
+        100.0 * share
     }
 
-    /// With the share of the time after the first two minutes.
-    pub fn usable_later(&self, record: Record) -> Record {
-        let [cycles, usable] = [0, 1].map(|i| self.0.iter().map(|it| it.later[i]).sum::<u64>());
-        record.number("usable_later_percent", 100.0 * usable as f64 / cycles.max(1) as f64, 1)
+    /// Returns the same after the first two minutes.
+    pub fn usable_later_percent(&self) -> f64 {
+        let (cycles, usable) = (self.count(|it| it.later[0]), self.count(|it| it.later[1]));
+        100.0 * usable as f64 / cycles.max(1) as f64
     }
 
-    /// With the time of motion after a stop until the answer was known, for 19 stops of 20.
-    pub fn known_again(&self, record: Record) -> Record {
+    /// Returns the time of motion in s after a stop until the answer was known, for 19 stops of 20.
+    pub fn known_again_s(&self) -> Option<f64> {
         let mut all: Vec<f64> = self.0.iter().flat_map(|it| it.known_s.iter().copied()).collect();
         all.sort_by(f64::total_cmp);
-        record.number("known_again_s", all.get(all.len() * 19 / 20).copied(), 1)
+        all.get(all.len() * 19 / 20).copied()
     }
 
-    /// With the median time until the first use.
-    pub fn first_use(&self, record: Record) -> Record {
-        let first_s = self.0.iter().map(|it| it.first_s.unwrap_or(f64::INFINITY));
-        record.number("first_use_s", median(first_s.collect()), 0)
+    /// Returns the median time in s until the first use.
+    pub fn first_use_s(&self) -> Option<f64> {
+        median(self.0.iter().map(|it| it.first_s.unwrap_or(f64::INFINITY)).collect())
     }
 }

@@ -13,9 +13,8 @@ use super::brake::Brake;
 use super::scenario_train::{DriveMoment, ScenarioTrain};
 use super::score::{Answer, COUNTS_MPS, QuantityScore, Scores};
 use super::world::{LoadSource, Mistakes, Scenario, Traffic, World};
-use crate::ending::until_due;
+use crate::ending::{over_until_due, until_due};
 use crate::output::Record;
-use crate::parallel;
 
 /// Time in s of the first comparison of errors with the bound, and the factor from each time to the next.
 const COMPARED_FIRST_S: f64 = 60.0;
@@ -125,7 +124,7 @@ pub struct Plan<'a> {
 pub fn run(plan: &Plan<'_>) -> Result<Vec<Record>, SettingError> {
     let of = |row| plan.kinds.iter().map(move |&kind| (row, kind));
     let cases: Vec<(&NamedScenario, PipelineKind)> = plan.scenarios.iter().flat_map(of).collect();
-    let rows = parallel::until_due(&cases, plan.threads, |(row, kind)| measure(plan, row, *kind));
+    let rows = over_until_due(&cases, plan.threads, |(row, kind)| measure(plan, row, *kind));
     Ok(rows.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
 }
 
@@ -243,17 +242,18 @@ fn record(
     let coverage = Some(all.percent(|it| it.covered)).filter(|_| all.count(|it| it.usable) > 0);
     let wrong_s = scores.iter().map(|it| it.wrong_s).fold(0.0, f64::max);
     let hours = plan.hours * scores.len() as f64;
-    let record = Record::default()
+    Record::default()
         .with("traffic", traffic.as_str())
         .with("condition", condition.as_str())
         .with("pipeline", kind.name())
         .with("quantity", quantity.name())
         .with("seeds", scores.len())
-        .with("first_seed", plan.first_seed);
-    let record = all.usable(record).number("coverage_percent", coverage, 1);
-    let record = all.usable_later(record);
-    let record = all.first_use(record);
-    all.known_again(record)
+        .with("first_seed", plan.first_seed)
+        .number("usable_percent", all.usable_percent(), 1)
+        .number("coverage_percent", coverage, 1)
+        .number("usable_later_percent", all.usable_later_percent(), 1)
+        .number("first_use_s", all.first_use_s(), 0)
+        .number("known_again_s", all.known_again_s(), 1)
         .number("changes_per_h", all.count(|it| it.changes) as f64 / hours, 1)
         .number("longest_wrong_s", wrong_s, 1)
         .number("error_percent", all.rms_percent(|it| it.error_square), 2)

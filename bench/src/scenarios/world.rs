@@ -3,10 +3,10 @@
 use dynocar_core::pipeline::train_kalman::TrainKalmanSettings;
 use dynocar_model::terms::{adhesion, wind};
 use dynocar_model::train::{Davis, TrainModel};
+use dynocar_tests::chance::Chance;
 use dynocar_tests::simulator::TrueDeviations;
 
 use super::brake::Brake;
-use crate::chance::Chance;
 
 /// The kinds of traffic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,7 +8,7 @@ use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::answer::{ExplainAnswer, ParameterValue};
 use dynocar_analysis::explain::explain;
 use dynocar_bench::scenarios::world::{LoadSource, Mistakes, World};
-use dynocar_bench::scenarios::{recorded, table};
+use dynocar_bench::scenarios::{table, write_dataset};
 use dynocar_shared::Uncertain;
 
 const HOURS: f64 = 1.0;
@@ -33,7 +33,7 @@ fn answer(row: &str) -> ExplainAnswer {
     (scenario.load, scenario.rate_hz) = (LoadSource::Exact, 10);
     let folder = tempfile::tempdir().unwrap();
     let world = World::draw(scenario, Mistakes::default(), SEED);
-    recorded::write(world, HOURS, folder.path()).unwrap();
+    write_dataset(world, HOURS, folder.path()).unwrap();
     let answer = explain(&dataset(folder.path()), &|_, _| {}).unwrap().answer;
     println!("{row}: {}", answer.statement);
     answer

@@ -1,4 +1,5 @@
-//! The folder where the FMU was unpacked, the files that describe train and line, and the models for them.
+//! Inputs during a step, with their slopes where they are given; the folder where the FMU was unpacked, the files that
+//! describe train and line, and the models for them.
 
 use std::ffi::{CStr, CString, OsString};
 use std::io::ErrorKind;
@@ -12,11 +13,11 @@ use dynocar_core::pipeline::Pipeline;
 use dynocar_estimators::EstimatorSettings;
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
-use dynocar_shared::{PipelineKind, TrainId};
+use dynocar_shared::{PipelineKind, SampleField, TrainId, TrainSample};
 
 use super::error::ModelError;
 use super::estimators::{Estimators, PIPELINES};
-use super::variables::ModelFile;
+use super::variables::{MISSING, ModelFile};
 
 /// The train of an instance; there is no other in it.
 pub const TRAIN: TrainId = TrainId(1);
@@ -35,15 +36,14 @@ impl ModelFile {
 #[derive(Clone, Debug)]
 pub struct DescriptionFiles {
     resources: String,
-    /// As they were set; empty for the FMU's own.
-    train: CString,
-    track: CString,
+    /// As they were set, by [`ModelFile`]; empty for the FMU's own.
+    paths: [CString; 2],
 }
 
 impl DescriptionFiles {
     /// Returns the FMU's own files at a location, as the simulator names it.
     pub fn from_resources(resources: String) -> Self {
-        DescriptionFiles { resources, train: CString::default(), track: CString::default() }
+        DescriptionFiles { resources, paths: Default::default() }
     }
 
     /// Returns where the FMU's own files are.
@@ -53,18 +53,12 @@ impl DescriptionFiles {
 
     /// Returns the path that was set.
     pub fn path(&self, file: ModelFile) -> &CStr {
-        match file {
-            ModelFile::Train => &self.train,
-            ModelFile::Track => &self.track,
-        }
+        &self.paths[file as usize]
     }
 
     /// Names another file.
     pub fn set(&mut self, file: ModelFile, path: &CStr) {
-        match file {
-            ModelFile::Train => self.train = path.into(),
-            ModelFile::Track => self.track = path.into(),
-        }
+        self.paths[file as usize] = path.into();
     }
 
     /// Returns the recommended estimators for this train on this line.
@@ -101,7 +95,8 @@ impl DescriptionFiles {
         let path = self.place(ModelFile::Train)?;
         let text = text_of(&path).map_err(|error| match error {
             ModelError::Unreadable { path, source }
-                if self.train.is_empty() && source.kind() == ErrorKind::NotFound =>
+                if self.path(ModelFile::Train).is_empty()
+                    && source.kind() == ErrorKind::NotFound =>
             {
                 ModelError::NoTrain(path)
             }
@@ -113,10 +108,12 @@ impl DescriptionFiles {
     /// `None` where no line was named and the FMU brings none along.
     fn read_track(&self) -> Result<Option<Track>, ModelError> {
         let path = match self.place(ModelFile::Track) {
-            Err(ModelError::NoFolder(_)) if self.track.is_empty() => return Ok(None),
+            Err(ModelError::NoFolder(_)) if self.path(ModelFile::Track).is_empty() => {
+                return Ok(None);
+            }
             place => place?,
         };
-        if self.track.is_empty() && !path.exists() {
+        if self.path(ModelFile::Track).is_empty() && !path.exists() {
             return Ok(None);
         }
         let text = text_of(&path)?;
@@ -165,6 +162,67 @@ fn percent_decoded(text: &[u8]) -> Option<Vec<u8>> {
     Some(decoded)
 }
 
+/// The inputs of an instance.
+#[derive(Clone, Copy, Debug)]
+pub struct Inputs {
+    /// The inputs as they were set; the sample's number is that of the newest step.
+    pub sample: TrainSample,
+    /// Slopes by [`SampleField`], in the input's unit per s.
+    slopes: [f64; SampleField::ALL.len()],
+}
+
+impl Default for Inputs {
+    fn default() -> Self {
+        let sample = TrainSample { run: 1, ..TrainSample::empty(TRAIN) };
+        Inputs { sample, slopes: [0.0; SampleField::ALL.len()] }
+    }
+}
+
+impl Inputs {
+    /// Sets a measured input; [`MISSING`] and NaN mean that it was not measured.
+    pub fn set(&mut self, field: SampleField, value: f64) {
+        if value.is_nan() || value == MISSING {
+            self.sample.valid &= !field.bit();
+        } else {
+            self.sample.set(field, value);
+        }
+    }
+
+    /// Returns the value of a field.
+    pub fn get(&self, field: SampleField) -> f64 {
+        self.sample.get(field).unwrap_or(MISSING)
+    }
+
+    /// Sets a slope for one step; a simulator that interpolates towards a missing value gives a slope that is no
+    /// number.
+    pub fn set_slope(&mut self, field: SampleField, per_s: f64) {
+        self.slopes[field as usize] = if per_s.is_finite() { per_s } else { 0.0 };
+    }
+
+    /// Forgets the slopes: each holds for one step.
+    pub fn end_step(&mut self) {
+        self.slopes.fill(0.0);
+    }
+
+    /// Returns the sample that acts `after_s` seconds after a time in s.
+    #[inline]
+    pub fn at(&self, time_s: f64, after_s: f64) -> TrainSample {
+        let mut sample = self.sample;
+        sample.time_ns = nanoseconds(time_s + after_s);
+        for field in SampleField::ALL {
+            if let Some(value) = sample.get(field) {
+                sample.set(field, value + self.slopes[field as usize] * after_s);
+            }
+        }
+        sample
+    }
+}
+
+/// As the reader of recorded runs makes a time of a cell.
+pub fn nanoseconds(time_s: f64) -> i64 {
+    (time_s * 1e9).round() as i64
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -189,5 +247,23 @@ mod tests {
         {
             assert_eq!(folder_of(location), None, "{location}");
         }
+    }
+
+    #[test]
+    fn a_slope_holds_for_one_step_and_what_is_missing_stays_missing() {
+        let mut inputs = Inputs::default();
+        inputs.set(SampleField::TractionForce, 1e3);
+        inputs.set_slope(SampleField::TractionForce, 200.0);
+        inputs.set_slope(SampleField::BrakeForce, 5.0);
+        let later = inputs.at(3.0, 0.5);
+        assert_eq!((later.time_ns, later.traction_force_n), (3_500_000_000, 1100.0));
+        assert_eq!(later.get(SampleField::BrakeForce), None);
+        inputs.set_slope(SampleField::TractionForce, f64::NAN);
+        assert_eq!(inputs.at(3.0, 0.5).traction_force_n, 1e3, "no number is no slope");
+        inputs.set_slope(SampleField::TractionForce, 200.0);
+        inputs.end_step();
+        assert_eq!(inputs.at(3.0, 0.5).traction_force_n, 1e3);
+        inputs.set(SampleField::TractionForce, f64::NAN);
+        assert_eq!(inputs.get(SampleField::TractionForce), MISSING);
     }
 }

@@ -11,8 +11,7 @@
 //! - [`estimators`], [`plant`]: the two models, each with its table of variables
 //! - [`description`]: both of them, as `modelDescription.xml` and as pages for people
 //! - [`error`]: why a call is refused
-//! - [`files`]: where the FMU was unpacked, the files of train and line, and the models for them
-//! - [`inputs`]: inputs during a step
+//! - [`files`]: inputs during a step; where the FMU was unpacked, the files of train and line, and the models for them
 //! - [`model`]: the model behind an instance: inputs, one of the models, the order of calls
 //! - [`ffi`]: the functions that a simulator calls
 //!
@@ -28,7 +27,6 @@ pub mod error;
 pub mod estimators;
 pub mod ffi;
 pub mod files;
-pub mod inputs;
 pub mod model;
 pub mod plant;
 pub mod variables;

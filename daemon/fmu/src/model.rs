@@ -8,8 +8,7 @@ use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 
 use crate::error::ModelError;
 use crate::estimators::{ESTIMATORS, Estimators};
-use crate::files::DescriptionFiles;
-use crate::inputs::{Inputs, nanoseconds};
+use crate::files::{DescriptionFiles, Inputs, nanoseconds};
 use crate::plant::{
     BEGINNING, STEP_MAX_S, least_step_s, reported, require_drivable, with_beginning,
 };

@@ -5,7 +5,7 @@ use dynocar_model::simulate::motion::SPEED_MAX_MPS;
 use dynocar_shared::SampleField;
 
 use crate::error::ModelError;
-use crate::inputs::Inputs;
+use crate::files::Inputs;
 use crate::variables;
 use crate::variables::{
     Begins, DrivenValue, Interface, Meaning, ModelFile, Variable, digits, guid, measured, row,

@@ -3,15 +3,11 @@
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_int, c_void};
 
-use dynocar_fmu::ffi::Status;
 use dynocar_fmu::ffi::instance::{CO_SIMULATION, CallbackFunctions, Component, FmiString, Logger};
-use dynocar_fmu::ffi::life::{
-    fmi2DoStep, fmi2EnterInitializationMode, fmi2ExitInitializationMode, fmi2FreeInstance,
-    fmi2Instantiate, fmi2SetupExperiment,
-};
-use dynocar_fmu::ffi::values::{
-    fmi2GetBoolean, fmi2GetInteger, fmi2GetReal, fmi2SetBoolean, fmi2SetInteger, fmi2SetReal,
-    fmi2SetRealInputDerivatives, fmi2SetString,
+use dynocar_fmu::ffi::{
+    Status, fmi2DoStep, fmi2EnterInitializationMode, fmi2ExitInitializationMode, fmi2FreeInstance,
+    fmi2GetBoolean, fmi2GetInteger, fmi2GetReal, fmi2Instantiate, fmi2SetBoolean, fmi2SetInteger,
+    fmi2SetReal, fmi2SetRealInputDerivatives, fmi2SetString, fmi2SetupExperiment,
 };
 use dynocar_fmu::{ESTIMATORS, Interface};
 

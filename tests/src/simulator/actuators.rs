@@ -1,17 +1,14 @@
 //! Drives, brakes and cylinders: acting forces from the driver's commands.
 
-use std::collections::VecDeque;
+use dynocar_model::simulate::elements::{DeadTime, lagged};
 
 use super::driving::Controls;
 use super::train_maker::TrueTrain;
 
-/// Returns a value after one step of a first-order lag.
-pub(super) fn lagged(value: f64, towards: f64, step_s: f64, lag_s: f64) -> f64 {
-    if lag_s <= 0.0 { towards } else { towards + (value - towards) * (-step_s / lag_s).exp() }
-}
-
-/// Returns `value` moved towards a goal by at most `change`.
-fn slewed(value: f64, goal: f64, change: f64) -> f64 {
+/// Returns `value` moved towards a goal by at most `change`. Unlike
+/// [`elements::slewed`](dynocar_model::simulate::elements::slewed) it may miss the goal by rounding; the numbers of
+/// seeded datasets depend on that.
+pub(crate) fn slewed(value: f64, goal: f64, change: f64) -> f64 {
     value + (goal - value).clamp(-change, change)
 }
 
@@ -96,7 +93,7 @@ fn friction_pressure_pa(train: &TrueTrain, brake_n: f64, speed_mps: f64) -> f64 
 /// True forces behind reported ones: a dead time and a first-order lag.
 #[derive(Clone, Debug)]
 pub struct LateForces {
-    waiting: VecDeque<Controls>,
+    dead_time: DeadTime<Controls>,
     force: Controls,
     step_s: f64,
     lag_s: f64,
@@ -105,15 +102,13 @@ pub struct LateForces {
 impl LateForces {
     /// Forces `delay_s` and `lag_s` behind, from a steady `initial` on.
     pub fn new(delay_s: f64, lag_s: f64, step_s: f64, initial: Controls) -> Self {
-        let steps = (delay_s / step_s).round() as usize;
-        let waiting = std::iter::repeat_n(initial, steps).collect();
-        LateForces { waiting, force: initial, step_s, lag_s }
+        let dead_time = DeadTime::steady(delay_s, step_s, initial);
+        LateForces { dead_time, force: initial, step_s, lag_s }
     }
 
     /// Returns the true forces when these are reported.
     pub fn advance(&mut self, reported: Controls) -> Controls {
-        self.waiting.push_back(reported);
-        let arrived = self.waiting.pop_front().unwrap_or(reported);
+        let arrived = self.dead_time.pass(reported);
         let force = &mut self.force;
         force.traction_force_n =
             lagged(force.traction_force_n, arrived.traction_force_n, self.step_s, self.lag_s);

@@ -1,6 +1,6 @@
 //! A driver who keeps to the limits, coasts and stops at the stations.
 
-use dynocar_model::simulate::motion::SimulatedMotion;
+use dynocar_model::simulate::motion::{SimulatedMotion, deceleration_mps2};
 
 use super::driving::{Controls, Driver, TrainOnLine};
 use super::line_maker::SimulatedLine;
@@ -160,7 +160,7 @@ impl<'a> TrainDriver<'a> {
     fn braking_acceleration_mps2(&self, motion: SimulatedMotion) -> f64 {
         let (speed_mps, stop_m) = (motion.speed_mps, self.stop_distance_m(motion));
         let ordinary_mps2 = self.braking_mps2();
-        let for_stop_mps2 = speed_mps * speed_mps / (2.0 * (stop_m - 0.3).max(0.4));
+        let for_stop_mps2 = deceleration_mps2((speed_mps, 0.0), (stop_m - 0.3).max(0.4));
         let ahead_mps = self.permitted_ahead_mps(motion);
         let is_falling = self.permitted.at(motion.distance_m) - ahead_mps > 0.02;
         let for_limit_mps2 = if is_falling { ordinary_mps2 } else { 0.0 }

@@ -1,6 +1,7 @@
 //! A simulated GNSS receiver.
 
 use dynocar_analysis::survey::geodesy::LocalPlane;
+use dynocar_model::simulate::elements::autoregressed;
 use dynocar_shared::TrainSample;
 
 use super::line_maker::SimulatedLine;
@@ -76,7 +77,7 @@ pub fn positions(
             last_s = time_s;
             for (error, fading_s) in errors.iter_mut().zip(fadings) {
                 let kept = (-step_s / fading_s).exp();
-                *error = kept * *error + (1.0 - kept * kept).sqrt() * random.gaussian();
+                *error = autoregressed(*error, kept, 1.0, random.gaussian());
             }
             if random.chance(receiver.gaps_per_hour * step_s / 3600.0) {
                 gap_until_s = time_s + random.uniform(10.0, 60.0);

@@ -1,9 +1,6 @@
 //! One seeded stream of random numbers per subject.
 
-use std::f64::consts::TAU;
-
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use crate::chance::Chance;
 
 /// Purpose of a stream of random numbers.
 ///
@@ -72,42 +69,39 @@ impl Stream {
 /// A seeded source of random numbers.
 #[derive(Clone, Debug)]
 pub struct SimulatorRandom {
-    generator: ChaCha8Rng,
+    chance: Chance,
     spare_gaussian: Option<f64>,
 }
 
 impl SimulatorRandom {
     /// Returns the stream of a subject under a seed.
     pub fn new(seed: u64, stream: Stream) -> Self {
-        let mut generator = ChaCha8Rng::seed_from_u64(seed);
-        generator.set_stream(stream.number());
-        SimulatorRandom { generator, spare_gaussian: None }
+        SimulatorRandom { chance: Chance::of_stream(seed, stream.number()), spare_gaussian: None }
     }
 
     /// Uniform from `low` to `high`.
     pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.generator.random::<f64>()
+        self.chance.between(low, high)
     }
 
-    /// Returns the standard normal (Box-Muller).
+    /// Returns a number drawn from the standard normal distribution; every second one completes a pair.
     pub fn gaussian(&mut self) -> f64 {
         if let Some(spare) = self.spare_gaussian.take() {
             return spare;
         }
-        let radius = (-2.0 * (1.0 - self.generator.random::<f64>()).ln()).sqrt();
-        let (sine, cosine) = (TAU * self.generator.random::<f64>()).sin_cos();
-        self.spare_gaussian = Some(radius * sine);
-        radius * cosine
+        let [gaussian, spare] = self.chance.normal_pair();
+        self.spare_gaussian = Some(spare);
+        gaussian
     }
 
     /// Returns a whole number from `low` to `high`, both included.
     pub fn integer(&mut self, low: usize, high: usize) -> usize {
-        self.generator.random_range(low..=high)
+        self.chance.within(low..=high)
     }
 
     /// True with this probability.
     pub fn chance(&mut self, probability: f64) -> bool {
-        self.generator.random::<f64>() < probability
+        self.chance.uniform() < probability
     }
 
     /// +1 or -1.

@@ -1,9 +1,9 @@
 //! Simulated sensors.
 
+use dynocar_model::simulate::elements::{lagged, quantised, shown};
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
-use super::actuators::lagged;
 use super::disturbances::Disturbances;
 use super::line_maker::SimulatedLine;
 use super::random::SimulatorRandom;
@@ -43,12 +43,12 @@ impl Sensor {
 
     /// Returns a reading of something that is never negative and exactly zero when it is off.
     fn read_positive(&self, truth: f64, random: &mut SimulatorRandom) -> f64 {
-        let reading = self.read(truth, random).max(0.0);
-        if truth == 0.0 { 0.0 } else { reading }
+        let reading = self.read(truth, random);
+        shown(truth, || reading)
     }
 
     fn to_quantum(self, value: f64) -> f64 {
-        if self.quantum > 0.0 { (value / self.quantum).round() * self.quantum } else { value }
+        if self.quantum > 0.0 { quantised(value, self.quantum) } else { value }
     }
 }
 

@@ -1,5 +1,6 @@
 //! Random trains of four types.
 
+use dynocar_model::simulate::elements::quantised;
 use dynocar_model::train::{BrakeGear, Davis, EffortCurve, TrainModel};
 
 use super::random::SimulatorRandom;
@@ -301,6 +302,6 @@ pub(super) fn rounded(value: f64, quantum: f64) -> f64 {
     if per_quantum >= 1.0 {
         (value * per_quantum.round()).round() / per_quantum.round()
     } else {
-        (value / quantum).round() * quantum
+        quantised(value, quantum)
     }
 }

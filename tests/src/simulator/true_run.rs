@@ -1,5 +1,6 @@
 //! One run as it truly happened.
 
+use dynocar_model::simulate::elements::autoregressed;
 use dynocar_model::simulate::motion::{SimulatedMotion, advance};
 use dynocar_model::train::TrainModel;
 
@@ -152,8 +153,8 @@ impl Weather {
     fn advance(&mut self) -> (f64, f64) {
         let now = (self.mean_headwind_mps + self.gust_mps, self.temperature_degc);
         let kept = (-TRUE_STEP_S / GUST_TIME_S).exp();
-        self.gust_mps = kept * self.gust_mps
-            + (1.0 - kept * kept).sqrt() * self.gust_sd_mps * self.random.gaussian();
+        self.gust_mps =
+            autoregressed(self.gust_mps, kept, self.gust_sd_mps, self.random.gaussian());
         self.temperature_degc += self.warming_k_per_step;
         now
     }

@@ -5,12 +5,13 @@
 //! Its Fisher information about the true speed is the sum over steps of (dp/dspeed)² / p, averaged over where in a step
 //! the true speed lies.
 
+use dynocar_model::simulate::elements::quantised;
 use dynocar_model::simulate::motion::{SimulatedMotion, advance};
 use dynocar_model::train::Davis;
+use dynocar_tests::chance::Chance;
 use nalgebra::{Matrix3, SMatrix, SVector};
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
-use crate::chance::Chance;
 use crate::statistics::jacobian;
 
 /// Approximately the last row of table 1: w0 = 2.2 + 0.025 v + 0.0013 v² in N/kN, v in km/h.
@@ -98,12 +99,11 @@ pub fn measure(condition: RunCondition, seed: u64) -> Vec<Vec<MeasuredRun>> {
             let samples = speeds.iter().enumerate().filter_map(|(index, &true_kmh)| {
                 let mut speed_kmh = true_kmh + NOISE_KMH * random.normal();
                 if random.uniform() < condition.outlier_share {
-                    let (low, high) = OUTLIER_KMH;
-                    let size = low + (high - low) * random.uniform();
+                    let size = random.between(OUTLIER_KMH.0, OUTLIER_KMH.1);
                     speed_kmh += random.sign() * size;
                 }
                 let is_missing = random.uniform() < condition.missing_share;
-                let speed_kmh = (speed_kmh / QUANTUM_KMH).round() * QUANTUM_KMH;
+                let speed_kmh = quantised(speed_kmh, QUANTUM_KMH);
                 (!is_missing).then_some(MeasuredRun { time_s: STEP_S * index as f64, speed_kmh })
             });
             samples.collect()
@@ -193,7 +193,7 @@ fn derivatives((start_kmh, end_kmh): (f64, f64)) -> Vec<[f64; 4]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::papers::score::w0_std;
+    use crate::papers::row::w0_std;
 
     #[test]
     fn the_runs_coast_between_the_speeds_they_should() {

@@ -4,14 +4,13 @@ use dynocar_core::pipeline::{Estimator, Outcome};
 use dynocar_estimators::wang::MassRegression;
 use dynocar_estimators::wang::force_model::LineResistance;
 use dynocar_model::force::ResolvedSample;
+use dynocar_tests::chance::Chance;
 
 use super::bound::{FisherInformation, mass_std_in_wind};
 use super::resistance_rows::{CROSSING, joint_least_squares};
 use super::ride::{kalman, known_resistance, leg, measure, presumed, staged, there_and_back, wind};
 use super::shuttle::{DisturbanceLaw, EMPTY_MASS_KG, Shuttle, calm};
-use crate::chance::Chance;
-use crate::papers::row::{PaperRow, Seeds, WANG};
-use crate::papers::score::PaperScore;
+use crate::papers::row::{PaperRow, PaperScore, Seeds, WANG};
 use crate::statistics::mean;
 
 /// Mass in kg and published deviation in % of each line of Table 3.

@@ -10,14 +10,13 @@ use dynocar_estimators::wang::{
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_tests::chance::Chance;
 use nalgebra::Vector3;
 
 use super::bound::FisherInformation;
 use super::ride::measure;
 use super::shuttle::{Shuttle, ShuttleMoment, calm};
-use crate::chance::Chance;
-use crate::papers::row::{PaperRow, Seeds, WANG};
-use crate::papers::score::{PaperScore, w0_errors};
+use crate::papers::row::{PaperRow, PaperScore, Seeds, WANG, w0_errors};
 use crate::statistics::{mean, root_mean_square};
 
 /// Samples of one crossing.

@@ -8,15 +8,17 @@ use dynocar_estimators::wang::{
     MassKalman, MassKalmanSettings, MassRegression, StagedDescent, StagedDescentSettings,
 };
 use dynocar_model::force::ResolvedSample;
+use dynocar_model::simulate::elements::{autoregressed, quantised, shown, slewed};
+use dynocar_model::simulate::motion::deceleration_mps2;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
+use dynocar_tests::chance::Chance;
 
 use super::shuttle::{
     BRAKE_MAX_N, CURVE_RADIUS_M, DisturbanceLaw, EMPTY_MASS_KG, PERIOD_S, STATIONS_M, Shuttle,
     ShuttleMoment,
 };
-use crate::chance::Chance;
-use crate::rig::pipelines::resolving;
+use crate::rig::resolving;
 use crate::statistics::KMH;
 
 const SERVICE_BRAKE_MPS2: f64 = 0.7;
@@ -31,7 +33,7 @@ fn limit_driver() -> impl FnMut(&Shuttle, &ShuttleMoment, f64) -> f64 {
     move |shuttle, now, to_m| {
         let brake_n = |deceleration: f64| (-now.mass_kg * deceleration).max(-BRAKE_MAX_N);
         let stop_m = (now.direction * (to_m - now.position_m)).max(1.0);
-        let stop_mps2 = now.speed_mps * now.speed_mps / (2.0 * stop_m);
+        let stop_mps2 = deceleration_mps2((now.speed_mps, 0.0), stop_m);
         is_stopping |= stop_mps2 > SERVICE_BRAKE_MPS2;
         if is_stopping {
             return brake_n(stop_mps2.clamp(0.5, 1.0));
@@ -66,8 +68,7 @@ fn limit_need(now: &ShuttleMoment) -> (f64, f64) {
         let entry_m = if now.direction > 0.0 { start_m } else { end_m };
         let ahead_m = now.direction * (entry_m - now.position_m);
         if ahead_m > 0.0 && now.speed_mps > limit_mps {
-            let surplus = now.speed_mps * now.speed_mps - limit_mps * limit_mps;
-            needed = needed.max(surplus / (2.0 * ahead_m.max(0.5)));
+            needed = needed.max(deceleration_mps2((now.speed_mps, limit_mps), ahead_m.max(0.5)));
         }
     }
     (needed, here_mps)
@@ -115,8 +116,7 @@ impl Shuttle {
         let mut ride = vec![now];
         loop {
             let wanted_n = driver(self, &now, to_m);
-            let change = FORCE_SLEW_N_PER_S * PERIOD_S;
-            let to_n = wanted_n.clamp(now.force_n - change, now.force_n + change);
+            let to_n = slewed(now.force_n, wanted_n, FORCE_SLEW_N_PER_S * PERIOD_S);
             let next = self.advance(&now, to_n, disturbance);
             if next.speed_mps <= 0.0 && now.force_n < 0.0 {
                 break;
@@ -241,7 +241,7 @@ pub fn wind(quadratic: f64, seed: u64) -> impl FnMut(f64) -> f64 {
     let mut gust_mps = GUST_STD_MPS * random.normal();
     let keep = (-PERIOD_S / GUST_TIME_S).exp();
     move |speed_mps| {
-        gust_mps = keep * gust_mps + GUST_STD_MPS * (1.0 - keep * keep).sqrt() * random.normal();
+        gust_mps = autoregressed(gust_mps, keep, GUST_STD_MPS, random.normal());
         let air_mps = speed_mps + mean_mps + gust_mps;
         quadratic * (air_mps * air_mps.abs() - speed_mps * speed_mps)
     }
@@ -280,14 +280,9 @@ pub fn measure(
     let mut resolve = resolving(TrainId(1), &shuttle.train, Some(shuttle.track.clone()));
     let mut resolved = Vec::with_capacity(ride.len());
     for (index, instant) in ride.iter().enumerate() {
-        let is_standing = instant.speed_mps <= 0.0;
-        let speed_mps = match is_standing {
-            true => 0.0,
-            false => {
-                let noisy = instant.speed_mps + SPEED_STD_MPS * random.normal();
-                ((noisy / SPEED_QUANTUM_MPS).round() * SPEED_QUANTUM_MPS).max(0.0)
-            }
-        };
+        let speed_mps = shown(instant.speed_mps, || {
+            quantised(instant.speed_mps + SPEED_STD_MPS * random.normal(), SPEED_QUANTUM_MPS)
+        });
         let mut sample = TrainSample::empty(TrainId(1))
             .with(SampleField::Speed, speed_mps)
             .with(SampleField::Position, instant.position_m)

@@ -9,8 +9,8 @@ use dynocar_model::simulate::motion::{SimulatedMotion, advance};
 use dynocar_model::track::{Track, TrackCurve, Tunnel};
 use dynocar_model::train::{Davis, EffortCurve, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_tests::chance::Chance;
 
-use crate::chance::Chance;
 use crate::statistics::KMH;
 
 /// Time in s between two samples: the controller's period of the paper.

@@ -12,16 +12,14 @@ use dynocar_estimators::xia::trajectory::step::StepRule;
 use dynocar_estimators::xia::wolfe_newton::{NewtonSettings, RestartSource, wolfe_newton};
 use dynocar_model::force::mps2_per_n_per_kn;
 use dynocar_model::train::Davis;
+use dynocar_tests::chance::Chance;
 use nalgebra::{Matrix3, Vector3};
 
-use super::offline;
 use super::scenario::{
     CASES, DrivingProfile, NoiseFreeRun, ROTATING_MASS_FACTOR, SAMPLING_M, SPEED_NOISE_MPS,
-    all_speeds_mps, disturbed_davis_covariance, drive, fast_speeds_mps,
+    all_speeds_mps, bounds, disturbed_davis_covariance, drive, fast_speeds_mps,
 };
-use crate::chance::Chance;
-use crate::papers::row::{PaperRow, Seeds, XIA};
-use crate::papers::score::{PaperScore, w0_std};
+use crate::papers::row::{PaperRow, PaperScore, Seeds, XIA, w0_std};
 use crate::statistics::{mean, root_mean_square};
 
 /// Data capacity I of the paper's window.
@@ -124,7 +122,7 @@ fn informed(
 fn paper(run: &NoiseFreeRun, speeds_mps: &[f64], seed: u64) -> Estimates {
     let mut source = RestartSource::new(seed);
     let mut davis = declared().0;
-    let bounds = ParameterBox { ..offline::bounds() };
+    let bounds = ParameterBox { ..bounds() };
     (1..=run.steps.len())
         .map(|end| {
             if let Some(first) = end.checked_sub(WINDOW) {

@@ -5,14 +5,17 @@
 //! (more is not possible: the paper's search ends at a mean square of ε1 = 0.05, which the true coefficients must
 //! reach). The truth moves by eq. 7, as the paper's own data do (mean squares of 1e-9).
 
+use dynocar_core::filter::levenberg_marquardt::ParameterBox;
 use dynocar_core::filter::triangular::{TriangularAccumulator, TriangularSystem};
 use dynocar_estimators::xia::trajectory::step::TrajectoryStep;
+use dynocar_estimators::xia::wolfe_newton::NewtonSettings;
 use dynocar_model::force::mps2_per_n_per_kn;
+use dynocar_model::simulate::elements::autoregressed;
 use dynocar_model::track::{Track, TrackCurve};
 use dynocar_model::train::Davis;
+use dynocar_tests::chance::Chance;
 use nalgebra::{DMatrix, Matrix3};
 
-use crate::chance::Chance;
 use crate::statistics::{self, KMH};
 
 /// Mass in t.
@@ -53,6 +56,13 @@ pub fn all_speeds_mps() -> Vec<f64> {
     (1..=10).map(|i| 30.0 * f64::from(i) * KMH).collect()
 }
 
+/// Table 2's bounds, with room below for the true a of cases 2 and 4.
+pub fn bounds() -> ParameterBox<3> {
+    let mut bounds = NewtonSettings::of_the_paper().bounds;
+    bounds.low[0] = 0.2;
+    bounds
+}
+
 /// How the train is driven.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DrivingProfile {
@@ -89,8 +99,7 @@ impl NoiseFreeRun {
             let disturbed = Davis { a: davis.a + disturbance, ..*davis };
             speeds_mps.push(next_speed_mps(step, &disturbed, speeds_mps[i]));
             let kept = (-step.size / (self.speeds_mps[i] * DISTURBANCE_S)).exp();
-            disturbance = kept * disturbance
-                + (1.0 - kept * kept).sqrt() * DISTURBANCE_N_PER_KN * random.normal();
+            disturbance = autoregressed(disturbance, kept, DISTURBANCE_N_PER_KN, random.normal());
         }
         NoiseFreeRun { steps: self.steps.clone(), speeds_mps }
     }

@@ -35,6 +35,25 @@ fn speed_after_dip(speed_mps: f64, start: f64, end: f64, step_s: f64) -> f64 {
     (lowest_mps.max(0.0) + 0.5 * end * (step_s - turn_s)).min(SPEED_MAX_MPS)
 }
 
+/// Returns the constant deceleration in m/s² that takes a train from one speed in m/s to another over a distance in m.
+pub fn deceleration_mps2((from_mps, to_mps): (f64, f64), over_m: f64) -> f64 {
+    (from_mps * from_mps - to_mps * to_mps) / (2.0 * over_m)
+}
+
+/// One step of Heun's method for the speed: returns the speed in m/s at its end, and the accelerations in m/s² at both
+/// ends. The acceleration depends on the end, 0 or 1, and on the speed there.
+#[inline]
+pub fn speed_step(
+    speed_mps: f64,
+    step_s: f64,
+    mut acceleration_mps2: impl FnMut(usize, f64) -> f64,
+) -> (f64, [f64; 2]) {
+    let start = acceleration_mps2(0, speed_mps);
+    let predicted_mps = (speed_mps + step_s * start).clamp(0.0, SPEED_MAX_MPS);
+    let end = acceleration_mps2(1, predicted_mps);
+    (speed_after(speed_mps, start, end, step_s), [start, end])
+}
+
 /// One step of Heun's method for a train whose acceleration in m/s² depends on the time in s since
 /// the step's start, and on distance and speed.
 ///
@@ -45,14 +64,11 @@ pub fn advance(
     step_s: f64,
     mut acceleration_mps2: impl FnMut(f64, SimulatedMotion) -> f64,
 ) -> SimulatedMotion {
-    let start = acceleration_mps2(0.0, motion);
-    let predicted_mps = (motion.speed_mps + step_s * start).clamp(0.0, SPEED_MAX_MPS);
-    let predicted = SimulatedMotion {
-        distance_m: motion.distance_m + 0.5 * step_s * (motion.speed_mps + predicted_mps),
-        speed_mps: predicted_mps,
-    };
-    let end = acceleration_mps2(step_s, predicted);
-    let speed_mps = speed_after(motion.speed_mps, start, end, step_s);
+    let (speed_mps, [start, end]) = speed_step(motion.speed_mps, step_s, |end, speed_mps| {
+        let after_s = end as f64 * step_s;
+        let distance_m = motion.distance_m + 0.5 * after_s * (motion.speed_mps + speed_mps);
+        acceleration_mps2(after_s, SimulatedMotion { distance_m, speed_mps })
+    });
     let travelled_m = if speed_mps > 0.0 || motion.speed_mps == 0.0 {
         // Exact for an acceleration linear in time.
         let bend_m = step_s * step_s * (start - end) / 12.0;

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::motion::{SPEED_MAX_MPS, STEP_MAX_S, speed_after};
+use super::motion::{SPEED_MAX_MPS, STEP_MAX_S, speed_step};
 use super::recording::{ForceModel, OpenLoopRecording, SampleRole};
 use crate::force::ResolvedSample;
 
@@ -121,10 +121,8 @@ impl Prediction {
 #[inline]
 fn step(model: &impl ForceModel, from: usize, speed_mps: f64, step_s: f64) -> f64 {
     if step_s <= STEP_MAX_S {
-        let start = model.acceleration_mps2(from, speed_mps);
-        let predicted_mps = (speed_mps + step_s * start).clamp(0.0, SPEED_MAX_MPS);
-        let end = model.acceleration_mps2(from + 1, predicted_mps);
-        return speed_after(speed_mps, start, end, step_s);
+        let at = |end: usize, speed| model.acceleration_mps2(from + end, speed);
+        return speed_step(speed_mps, step_s, at).0;
     }
     let parts = (step_s / STEP_MAX_S).ceil();
     let part_s = step_s / parts;
@@ -134,9 +132,7 @@ fn step(model: &impl ForceModel, from: usize, speed_mps: f64, step_s: f64) -> f6
         from_here + share * (from_next - from_here)
     };
     (0..parts as usize).fold(speed_mps, |speed, part| {
-        let start = at(part as f64 / parts, speed);
-        let end = at((part + 1) as f64 / parts, (speed + part_s * start).clamp(0.0, SPEED_MAX_MPS));
-        speed_after(speed, start, end, part_s)
+        speed_step(speed, part_s, |end, speed| at((part + end) as f64 / parts, speed)).0
     })
 }
 

@@ -89,11 +89,8 @@ impl OpenLoopRecording {
             .map(|sample| sample.time_ns.saturating_sub(first_ns) as f64 * 1e-9)
             .collect();
         let knows_gradient = samples.iter().any(|sample| sample.gradient_permille.is_some());
-        let bridged = bridge(&mut samples, &time_s, |s| &mut s.traction_force_n).max(bridge(
-            &mut samples,
-            &time_s,
-            |s| &mut s.brake_force_n,
-        ));
+        let tractions = bridge(&mut samples, &time_s, |s| &mut s.traction_force_n);
+        let bridged = tractions.max(bridge(&mut samples, &time_s, |s| &mut s.brake_force_n));
         // A profile along the line has no short gaps in time: hold it to the ends of the run.
         bridge(&mut samples, &time_s, |s| &mut s.gradient_permille);
         hold_ends(&mut samples);
@@ -185,13 +182,9 @@ fn bridge(
 /// Gives the samples before the first known gradient its value: an accelerometer shows the
 /// gradient only from the second sample on.
 fn hold_ends(samples: &mut [ResolvedSample]) {
-    let Some(first) = samples.iter().position(|sample| sample.gradient_permille.is_some()) else {
-        return;
-    };
-    let gradient_permille = samples[first].gradient_permille;
-    for sample in &mut samples[..first] {
-        sample.gradient_permille = gradient_permille;
-    }
+    let gradient_permille = samples.iter().find_map(|sample| sample.gradient_permille);
+    let unknown = samples.iter_mut().take_while(|sample| sample.gradient_permille.is_none());
+    unknown.for_each(|sample| sample.gradient_permille = gradient_permille);
 }
 
 fn roles(samples: &[ResolvedSample], time_s: &[f64], knows_gradient: bool) -> Vec<SampleRole> {
