@@ -1,6 +1,6 @@
 //! A simulated GNSS receiver.
 
-use dynocar_analysis::survey::geodesy::LocalPlane;
+use dynocar_analysis::survey::alignment::LocalPlane;
 use dynocar_model::simulate::elements::autoregressed;
 use dynocar_shared::TrainSample;
 

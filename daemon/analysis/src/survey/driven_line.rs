@@ -1,9 +1,8 @@
 //! The line that is driven repeatedly, and the parts of recordings that are passes of it.
 
-use super::alignment::Alignment;
+use super::alignment::{Alignment, distance_squared};
 use super::both_directions::{Compared, compare};
 use super::centring::{SurveyPass, align};
-use super::geodesy::distance_squared;
 use super::recording::{RecordingPart, SAME_ALIGNMENT_M, SurveyRecording};
 use super::silence::{TracePoint, filled, trace};
 use super::tracking::follow;

@@ -7,7 +7,7 @@
 //!
 //! # Layout, in the order of reading
 //!
-//! - [`recording`], [`geodesy`]: recordings and their one-way parts, on a plane in metres
+//! - [`recording`]: recordings and their one-way parts, on a plane in metres
 //! - [`alignment`], `silence`, `tracking`, `centring`, `both_directions`, [`driven_line`]: the line that
 //!   is driven repeatedly
 //! - [`chainage`]: a chainage for every row; [`stops`]: places where the passes stop
@@ -22,7 +22,6 @@ mod both_directions;
 mod centring;
 pub mod chainage;
 pub mod driven_line;
-pub mod geodesy;
 pub mod learn;
 pub mod normal;
 pub mod observation;

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use dynocar_model::terms::wheel::STILL_MPS;
 
-use super::geodesy::{LocalPlane, between, distance_squared};
+use super::alignment::{LocalPlane, between, distance_squared};
 use crate::statistics::middle;
 
 /// Least time in s between fixes that are used: closer ones have the same error, which fades over seconds.

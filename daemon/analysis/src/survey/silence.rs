@@ -1,6 +1,6 @@
 //! Gaps of a receiver's fixes, filled with the path of another pass.
 
-use super::geodesy::distance_squared;
+use super::alignment::distance_squared;
 use super::recording::{RecordingPart, SAME_ALIGNMENT_M, SurveyRecording};
 
 /// Distance in m between fixes along the path above which the path between them is open.

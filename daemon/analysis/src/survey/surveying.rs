@@ -1,10 +1,9 @@
 //! The whole survey, step by step.
 
-use super::alignment::{FoundCurve, curves, turning_rad};
+use super::alignment::{FoundCurve, LocalPlane, curves, turning_rad};
 use super::banded::NotPositive;
 use super::chainage::WheelsAndLag;
 use super::driven_line::{Alignments, find, pass_of};
-use super::geodesy::LocalPlane;
 use super::learn::{LearnedProfile, acting_from_pa, learn};
 use super::normal::{HeightLayout, LineCourse};
 use super::observation::{BlockDifference, Prior, observations};

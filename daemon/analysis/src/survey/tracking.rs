@@ -1,7 +1,6 @@
 //! Following a recording along an alignment: a chainage for each fix.
 
-use super::alignment::{Alignment, Foot};
-use super::geodesy::distance_squared;
+use super::alignment::{Alignment, Foot, distance_squared};
 use super::recording::{Fix, SAME_ALIGNMENT_M, SurveyRecording};
 use crate::statistics::least_first;
 
