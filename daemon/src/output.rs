@@ -3,7 +3,6 @@
 //! A reader that has gone away ends the printing and nothing else; a full disk is an error in words. A file is written
 //! under another name and takes its own name once it is whole, so that even after an abrupt end of the program the old
 //! or the new file is there, never a part of one.
-//!
 //! [`Redrawn`] writes lines on a terminal that later lines replace.
 
 use std::fs::{File, Metadata};

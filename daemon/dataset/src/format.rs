@@ -15,7 +15,7 @@ pub struct Format {
     pub mark: Option<(&'static [u8], &'static str)>,
     /// How a run of a dataset is read; `None` where a run cannot have this format.
     pub run: Option<RunReading>,
-    /// What a recording of all messages is on disk; `None` where a recording cannot have this format.
+    /// Kind of path that leads to a recording; `None` where a recording cannot have this format.
     pub recording: Option<RecordingPath>,
 }
 
@@ -28,7 +28,7 @@ pub enum RunReading {
     Library,
 }
 
-/// What a recording is on disk.
+/// Kind of path that leads to a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RecordingPath {
     /// A file.

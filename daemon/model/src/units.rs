@@ -65,8 +65,8 @@ const STANDARD_GRAVITY_MPS2: f64 = 9.80665;
 /// Watts in a mechanical horsepower: 550 foot pounds-force in a second (NIST SP 811, appendix B.8).
 const HORSEPOWER_W: f64 = 550.0 * 0.3048 * POUND_FORCE_N;
 
-/// Lists the units by their dimension: a name, with the factor and divisor to the base unit and, for temperatures, what
-/// is added before; spellings in files. A `rare` unit is read where a file says it, and never guessed.
+/// Lists the units by their dimension: a name, the shift that is added to a value before it is scaled, factor and divisor
+/// to the base unit, and spellings in files. A `rare` unit is read where a file says it, and never guessed.
 macro_rules! units {
     ($( $dimension:ident { $(
         $kind:ident $name:literal $( shift $shift:literal )? = $multiply:expr, $divide:expr; $spellings:literal

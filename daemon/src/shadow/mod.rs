@@ -6,7 +6,7 @@
 //! to the model before it. Each rival has its own pipelines and residual monitor, whose snapshots nobody else sees.
 //! When the store's decisions put another model in force, its pipelines, warm by then, change places with those at
 //! work while the train stands ([`crate::runtime::exchange`]). The pipeline threads and the controller never wait for
-//! any of this.
+//! any of this. [`start`] starts the thread.
 //!
 //! # Layout
 //!
@@ -14,8 +14,6 @@
 //! - [`rule`]: which models are on trial, when a rule adopts or takes back, and which bounds no model may leave
 //! - [`train`]: one train's trials, and its change of models
 //! - [`record`]: measurements of the trials: a file that outlives the daemon, and figures for the metrics
-//!
-//! [`start`] starts the thread: one more reader of the samples, which nobody waits for.
 
 pub mod in_force;
 pub mod record;

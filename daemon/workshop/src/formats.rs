@@ -1,6 +1,6 @@
-//! The libraries of the formats that are not text: what the workshop reads and writes by them.
+//! The libraries of the formats that are not text: the workshop's readers and writers of their files.
 //!
-//! A recording of any format holds what MCAP holds. So each library exchanges its recordings with MCAP.
+//! A recording has the same contents in every format. So each library exchanges its recordings with MCAP.
 
 use std::path::{Path, PathBuf};
 
@@ -26,7 +26,7 @@ pub struct Library {
     /// Reads a recording with all of its messages.
     pub whole: fn(&[PathBuf]) -> Result<Recording, String>,
     /// Exchanges recordings with MCAP; `None` for MCAP itself.
-    pub exchange: Option<Exchange>,
+    pub exchange: Option<McapExchange>,
 }
 
 /// Reads the mapped columns of a run, and the train of each row.
@@ -41,7 +41,7 @@ pub enum RunFile<'f> {
 }
 
 /// How recordings are exchanged with MCAP.
-pub struct Exchange {
+pub struct McapExchange {
     /// Writes recordings in MCAP as a new recording of the format.
     pub from_mcap: fn(&[PathBuf], &Path) -> Result<Written, CopyError>,
     /// Writes a recording of the format as a new file of MCAP; returns the number of messages.
@@ -68,7 +68,7 @@ static LIBRARIES: [Library; 2] = [
         }),
         samples: |paths| parquet(paths).map(ParquetContent::into_recording),
         whole: |paths| parquet(paths).map(ParquetContent::into_recording),
-        exchange: Some(Exchange {
+        exchange: Some(McapExchange {
             from_mcap: write_folder,
             to_mcap: |paths, output| {
                 let content = parquet(paths).map_err(Failure::Input)?;

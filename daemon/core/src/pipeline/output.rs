@@ -1,4 +1,4 @@
-//! What an estimator gives: the quantities that its kind can answer, and its estimate in a snapshot.
+//! Output of an estimator: the quantities that its kind can answer, and its estimate in a snapshot.
 
 use dynocar_shared::snapshot::{PARAMETERS_MAX, packed_index};
 use dynocar_shared::{Manoeuvre, Parameter, ParameterSnapshot, PipelineKind, Quantity};

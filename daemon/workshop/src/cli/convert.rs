@@ -10,7 +10,7 @@ use dynocar_parquet::writing::Written;
 
 use crate::convert::{ModelFiles, Unpacked, unpack};
 use crate::dataset::from_dataset;
-use crate::formats::{self, Exchange, is_recording};
+use crate::formats::{self, McapExchange, is_recording};
 
 /// Convert recordings between MCAP, CSV datasets and Parquet.
 #[derive(Debug, Args)]
@@ -89,7 +89,7 @@ fn is_dataset(path: &Path) -> bool {
 fn from_mcap(
     arguments: &ConvertArguments,
     dataset: Option<&PathBuf>,
-    exchange: &Exchange,
+    exchange: &McapExchange,
 ) -> Result<(), Failure> {
     let ConvertArguments { from, output, .. } = arguments;
     let written = match dataset {

@@ -1,4 +1,4 @@
-//! `dynocar import`: a train and a line from other projects' files, and the account of what was read.
+//! `dynocar import`: a train and a line from other projects' files, and the account of their contents.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! What the learner keeps from round to round: its memory, and recordings, each unpacked once into a folder of the
+//! The learner's memory from round to round, and its recordings, each unpacked once into a folder of the
 //! learner, because the flight recorder's ring deletes the oldest ones.
 //!
 //! The memory saves work and repetition, and no result depends on it: a lost memory starts anew, since candidates and

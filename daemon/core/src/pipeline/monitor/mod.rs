@@ -85,21 +85,21 @@ settings! {
 }
 
 /// Columns of the base model: a, b, c, two force scales, the delay, and the other figures that are never exact.
-pub const BASE: usize = UNKNOWNS + USUAL.len();
+const BASE: usize = UNKNOWNS + USUAL.len();
 /// Index of the load of a run: the true over the given mass less 1.
-pub const LOAD: usize = UNKNOWNS;
+const LOAD: usize = UNKNOWNS;
 /// Index of the headwind of a run in m/s.
-pub const DAY_WIND: usize = UNKNOWNS + 1;
+const DAY_WIND: usize = UNKNOWNS + 1;
 /// Index of the error of the curve constant, in 1000 N/kN m.
-pub const CURVE: usize = UNKNOWNS + 2;
+const CURVE: usize = UNKNOWNS + 2;
 /// Index of the resistance that cold bearings add at the start of a run, as a share of a.
-pub const WARMING: usize = UNKNOWNS + 3;
+const WARMING: usize = UNKNOWNS + 3;
 /// Parameters that are suspects only where their value is unusual; the delay is judged by itself.
-pub const UNUSUAL: [usize; 5] = [TRACTION_SCALE, LOAD, DAY_WIND, CURVE, WARMING];
+const UNUSUAL: [usize; 5] = [TRACTION_SCALE, LOAD, DAY_WIND, CURVE, WARMING];
 /// Suspects with a column of their own in addition to the base model.
-pub const SUSPECTS: usize = TERMS.len() + BANDS.len();
+const SUSPECTS: usize = TERMS.len() + BANDS.len();
 /// The suspects: terms, and forces in bands of the speed, which follow no term.
-pub const BANK: [Suspect; SUSPECTS] = {
+const BANK: [Suspect; SUSPECTS] = {
     let mut bank = [BANDS[0]; SUSPECTS];
     let mut index = 0;
     while index < SUSPECTS {
@@ -109,30 +109,30 @@ pub const BANK: [Suspect; SUSPECTS] = {
     bank
 };
 /// Columns that come from samples: the base model's parameters beyond the unknowns of the regression, and the suspects.
-pub const COVARIATES: usize = USUAL.len() + SUSPECTS;
+const COVARIATES: usize = USUAL.len() + SUSPECTS;
 /// Index of the first band of speed among the parameters.
-pub const FIRST_BAND: usize = BASE + TERMS.len();
+const FIRST_BAND: usize = BASE + TERMS.len();
 /// Onsets of a dragging brake that are kept side by side.
-pub const ONSETS: usize = 12;
+const ONSETS: usize = 12;
 /// Index of the first onset among the parameters.
-pub const FIRST_ONSET: usize = BASE + SUSPECTS;
+const FIRST_ONSET: usize = BASE + SUSPECTS;
 /// All parameters of the regression.
-pub const PARAMETERS: usize = FIRST_ONSET + ONSETS;
+const PARAMETERS: usize = FIRST_ONSET + ONSETS;
 /// Candidate without a column: wheels of another diameter.
-pub const WHEEL: usize = PARAMETERS;
+const WHEEL: usize = PARAMETERS;
 /// All parameters, and the wheels.
-pub const CANDIDATES: usize = PARAMETERS + 1;
+const CANDIDATES: usize = PARAMETERS + 1;
 /// Candidates among them.
-pub const SEARCHED: usize = UNUSUAL.len() + 1 + CANDIDATES - BASE;
+const SEARCHED: usize = UNUSUAL.len() + 1 + CANDIDATES - BASE;
 
 /// Returns the suspect behind a column from samples.
-pub fn covariate(index: usize) -> &'static Suspect {
+fn covariate(index: usize) -> &'static Suspect {
     if index < USUAL.len() { &USUAL[index] } else { &BANK[index - USUAL.len()] }
 }
 
 /// Returns the suspect behind a parameter; a, b, c and the brake's scale are not suspects, and stand for the
 /// traction's.
-pub fn suspect_of(parameter: usize) -> &'static Suspect {
+fn suspect_of(parameter: usize) -> &'static Suspect {
     match parameter {
         FIRST_ONSET.. => &brake::SUSPECT,
         UNKNOWNS.. => covariate(parameter - UNKNOWNS),
@@ -141,7 +141,7 @@ pub fn suspect_of(parameter: usize) -> &'static Suspect {
 }
 
 /// Returns the effect behind a candidate.
-pub fn effect_of(candidate: usize) -> EffectKind {
+fn effect_of(candidate: usize) -> EffectKind {
     match candidate {
         FORCE_DELAY => EffectKind::ActuatorDelay,
         WHEEL => EffectKind::WheelDiameter,
@@ -154,7 +154,7 @@ const SPACING: u32 = 3;
 
 /// Ages of the onsets in blocks; `None` for a free place.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Onsets {
+struct Onsets {
     ages: [Option<u32>; ONSETS],
     since_newest: u32,
 }
@@ -227,7 +227,7 @@ const STEP_MIN_PA: f64 = 2500.0;
 
 /// Watches the pressure of released brakes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ReleasedPressure {
+struct ReleasedPressure {
     released_s: f64,
     seen_s: f64,
     mean_pa: f64,

@@ -1,4 +1,4 @@
-//! What was understood, with pictures; of a dataset its runs: motion, quality of the data, notes.
+//! Contents of a file as understood, with pictures; of a dataset its runs: motion, quality of the data, notes.
 
 use std::iter;
 use std::path::Path;

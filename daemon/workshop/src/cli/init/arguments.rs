@@ -1,4 +1,4 @@
-//! The command line of `dynocar init`, which asks for missing facts at a terminal, and what it reports.
+//! The command line of `dynocar init`, which asks for missing facts at a terminal, and its report.
 
 use std::io::{IsTerminal, stderr, stdin};
 use std::path::{Path, PathBuf};
