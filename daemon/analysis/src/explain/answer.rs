@@ -7,10 +7,10 @@ use dynocar_model::named;
 use dynocar_shared::HALF_95;
 use serde::{Deserialize, Serialize};
 
+use super::course::Course;
 pub use super::location::{
     CovariateRange, Location, PlaceUncertainty, RunWindow, WindowUncertainty,
 };
-use super::over_time::Course;
 use super::stop_to_stop::{Judged, StopToStop};
 use crate::dataset::DatasetDiagnostic;
 

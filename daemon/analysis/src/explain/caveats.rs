@@ -12,10 +12,10 @@ use nalgebra::Cholesky;
 
 use super::answer::{DavisDeviations, EffectAnswer, Identifiability, PlaceUncertainty};
 use super::competing::separating_run;
+use super::course::Course;
 use super::effects::{Candidate, LIBRARY};
 use super::evidence::{Fit, FitProblem};
 use super::held_out::HeldOutEffect;
-use super::over_time::Course;
 use super::report::effect::{by_held_out_runs, small};
 use super::score::PredictionScore;
 use super::selection::{Deviations, Search, SearchOutcome};

@@ -12,7 +12,7 @@
 //!   jointly with the usual errors
 //! - [`score`], [`stop_to_stop`]: open-loop prediction of fit and holdout runs
 //! - [`many`]: with many runs, some of them for the search, all of them for sizes and scores
-//! - [`over_time`], [`held_out`]: numbers that differ between runs, and confirmation by the holdout runs
+//! - [`course`], [`over_time`], [`held_out`]: numbers that differ between runs, and confirmation by the holdout runs
 //! - [`unexplained`], [`competing`], [`meaning`], [`caveats`], [`verdict`], [`answer`]: the
 //!   statement
 //! - [`report`]: further contents of a report
@@ -22,6 +22,7 @@
 pub mod answer;
 pub mod caveats;
 pub mod competing;
+pub mod course;
 pub mod drive_efficiency;
 pub mod effects;
 pub mod evidence;

@@ -12,7 +12,7 @@ use dynocar_model::terms::{masses, wind};
 use dynocar_model::train::Davis;
 use nalgebra::{SMatrix, SVector};
 
-use super::model::integrate_bins;
+use super::integral::integrate_bins;
 use super::noise::{Noise, RunScatter};
 use super::run_data::RunData;
 use super::whitener::{BinWhitener, robust_weight};

@@ -5,8 +5,9 @@
 //! - [`sentence`]: the verdict in a plain sentence
 //! - [`effect`]: an effect in words
 //! - [`errors`]: open-loop errors before and after, with bootstrap intervals
-//! - [`windows`], [`covariates`], [`panels`]: the residual as a force, window by window and along the line, against
+//! - [`windows`], [`covariates`], [`panels`]: the residual as a force, window by window, against
 //!   covariates
+//! - [`residual_line`]: the residual along the line, by direction, with the places found
 //! - [`timeline`]: the explanation as events and series in time, speeds of runs
 //! - [`parameters`]: fitted values, with uncertainty
 //! - [`candidates`]: other explanations
@@ -20,6 +21,7 @@ pub mod effect;
 pub mod errors;
 pub mod panels;
 pub mod parameters;
+pub mod residual_line;
 pub mod sentence;
 pub mod timeline;
 pub mod windows;
@@ -31,8 +33,8 @@ use errors::Errors;
 use panels::Panel;
 pub use parameters::IntervalEstimate;
 use parameters::{ParameterRow, PlaceTable};
+use residual_line::AlongLine;
 use timeline::Trace;
-use windows::AlongLine;
 
 /// Everything that a report shows beyond the answer and the dataset's own account.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,13 +1,12 @@
 //! Whether a trial is more than chance, large enough to matter, and seen in the runs. An effect is accepted because it
-//! removes much of the error for its evidence and its price, or because it is certain; a refusal states its reason.
+//! removes much of the error for its evidence, or because it is certain; a refusal states its reason.
 
 use dynocar_shared::vocabulary::EffectKind;
-use nalgebra::{Cholesky, DMatrix};
 
 use super::by_run::{deviations, scatter_factor};
-use super::outcome::{EffectTrial, SearchOutcome};
+use super::outcome::{EffectTrial, Refusal, SearchOutcome, at_bound, penalty};
 use super::search::Search;
-use crate::explain::effects::{AtBound, Certainty, SharedHypothesis, policy_of};
+use crate::explain::effects::{Certainty, SharedHypothesis, policy_of};
 use crate::explain::evidence::{
     CERTAIN_STDS, CERTAIN_STDS_BY_RUN, EQUAL, Fit, OUTSIDE_COST, SCORE_MIN, acceptance_score,
 };
@@ -182,114 +181,4 @@ pub(super) fn contradiction_of(fit: &Fit, index: usize) -> Option<&'static str> 
 /// Returns whether the parameters of an effect are possible for its kind.
 pub(super) fn may_be(fit: &Fit, index: usize) -> bool {
     contradiction_of(fit, index).is_none() && at_bound(fit, index).is_none()
-}
-
-/// Returns the price of an effect of a fitted model in -2 log likelihood. Each parameter costs the logarithm of the
-/// number of observations (Schwarz 1978), each choice of a structure twice the logarithm of the number of structures.
-/// For an effect that depends on one number per run, a run is one observation. Parameters with a prior of their own
-/// cost the log determinant by which the data narrow them (Laplace's approximation of the evidence; Rasmussen and
-/// Williams 2006, equation 3.32).
-pub fn penalty(fit: &Fit, index: usize) -> f64 {
-    let effect = &fit.model.effects[index];
-    let narrowed = effect.nature().prior.and_then(|prior| narrowed(fit, index, prior));
-    let by_count = || {
-        let parameters = effect.parameters().len() as f64;
-        let observations =
-            if effect.nature().is_one_number_a_run { fit.runs.len() } else { fit.observations() };
-        parameters * (observations.max(2) as f64).ln()
-    };
-    narrowed.unwrap_or_else(by_count) + effect.nature().choice_cost
-}
-
-/// Returns the logarithm of the determinant of the information about an effect's parameters, all others fitted, over
-/// that of the prior; `None` when one of them is singular.
-fn narrowed(fit: &Fit, index: usize, prior: &DMatrix<f64>) -> Option<f64> {
-    let own = fit.model.ranges()[index].clone();
-    let information = fit.information();
-    let others: Vec<usize> = (0..fit.theta.len()).filter(|i| !own.contains(i)).collect();
-    let rest = information.select_rows(&others).select_columns(&others);
-    let log_determinant =
-        |matrix: DMatrix<f64>| Some(2.0 * Cholesky::new(matrix)?.l().diagonal().map(f64::ln).sum());
-    let all = log_determinant(information)?;
-    Some(all - log_determinant(rest)? - log_determinant(prior.clone())?)
-}
-
-/// Returns the decrease of -2 log likelihood by an effect of a fitted model, less the decrease that errors shared by
-/// all runs would bring: (x/s)² becomes x²/(s² + e²), for each parameter.
-pub fn discounted(fit: &Fit, index: usize, decrease: f64) -> f64 {
-    let effect = &fit.model.effects[index];
-    let shared = effect.nature().shared_error;
-    if shared == 0.0 || decrease <= 0.0 {
-        return decrease;
-    }
-    let parameters = fit.effect_parameters(index);
-    let each = decrease / parameters.len() as f64;
-    decrease / (1.0 + each * (shared / effect.size(parameters)).powi(2))
-}
-
-/// Returns the parameter of effect number `index` that lies at a bound of its range.
-pub fn at_bound(fit: &Fit, index: usize) -> Option<AtBound> {
-    fit.model.effects[index].at_bound(fit.effect_parameters(index))
-}
-
-/// The price of all effects of a model.
-pub fn model_penalty(fit: &Fit) -> f64 {
-    (0..fit.model.effects.len()).map(|index| penalty(fit, index)).sum()
-}
-
-/// Share of the error below which a weak effect is refused for removing too little, above for too little evidence.
-const LITTLE: f64 = 0.2;
-
-/// Why an effect is not accepted.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Refusal {
-    /// Its evidence is negative.
-    Chance,
-    /// It is smaller than the usual errors of declared figures.
-    Immaterial,
-    /// A parameter lies at a bound of its range: these data do not determine it.
-    AtBound(AtBound),
-    /// The fitted values contradict the kind.
-    Contradiction(&'static str),
-    /// It changes the mass of single runs no more than loads usually do, which explains it.
-    UsualLoads,
-    /// This kind explains more jointly with the usual errors.
-    GivesWay(EffectKind),
-    /// It removes too little of the error for its evidence, this share of it.
-    Weak(f64),
-}
-
-impl Refusal {
-    /// Returns whether only the kind is in doubt: something is left to explain.
-    pub fn leaves_a_residual(&self) -> bool {
-        matches!(self, Refusal::AtBound(_) | Refusal::Contradiction(_))
-    }
-}
-
-impl std::fmt::Display for Refusal {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Refusal::Chance => "explains no more than chance",
-            Refusal::Immaterial => "below the accuracy of declared figures",
-            Refusal::AtBound(AtBound { name, bound }) => {
-                return write!(
-                    f,
-                    "not identifiable from these data: {name} runs to the bound {bound} of what is \
-                     looked for"
-                );
-            }
-            Refusal::Contradiction(why) => why,
-            Refusal::UsualLoads => {
-                "its runs stand out from the others no more than the largest of as many loads do"
-            }
-            Refusal::GivesWay(kind) => {
-                return write!(f, "{} and the usual errors explain more", kind.name());
-            }
-            Refusal::Weak(share) if *share < 0.005 => "takes nothing from the error",
-            Refusal::Weak(share) => {
-                let why = if *share < LITTLE { ": too little" } else { ", on too little evidence" };
-                return write!(f, "takes {:.0} % from the error{why}", 100.0 * share);
-            }
-        })
-    }
 }

@@ -11,12 +11,14 @@ mod small;
 mod sources;
 mod trying;
 
-pub use acceptance::{Refusal, deciding_score, discounted, model_penalty, penalty};
+pub use acceptance::deciding_score;
 pub use by_run::{
     Deviations, FORM_SHARE, deviations, deviations_with_nuisance, enlarged_by_scatter,
     few_runs_factor, std_with_forms, without_each_run,
 };
 pub use nuisance::{deviations_given, is_certain_with_nuisance, move_to_nuisance_fit};
-pub use outcome::{EffectTrial, NuisanceFit, SearchOutcome};
+pub use outcome::{
+    EffectTrial, NuisanceFit, Refusal, SearchOutcome, discounted, model_penalty, penalty,
+};
 pub use search::{OBSERVATIONS_MIN, Progress, Search};
 pub use sources::ScaleSources;

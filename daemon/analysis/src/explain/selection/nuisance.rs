@@ -10,11 +10,12 @@ use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::acceptance::{
-    CERTAIN_RUNS_MIN, Refusal, at_bound, is_certain, is_left_by_moved_places, is_material,
-    is_possible, moves_places, penalty,
+    CERTAIN_RUNS_MIN, is_certain, is_left_by_moved_places, is_material, is_possible, moves_places,
 };
 use super::by_run::{Deviations, deviations, deviations_with_nuisance};
-use super::outcome::{EffectTrial, NuisanceFit, SearchOutcome, round_of};
+use super::outcome::{
+    EffectTrial, NuisanceFit, Refusal, SearchOutcome, at_bound, penalty, round_of,
+};
 use super::search::Search;
 use super::trying::{Asked, PROMISE_TIMES};
 use crate::explain::effects::{

@@ -3,8 +3,8 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::acceptance::{is_possible, penalty};
-use super::outcome::{EffectTrial, SearchOutcome};
+use super::acceptance::is_possible;
+use super::outcome::{EffectTrial, SearchOutcome, penalty};
 use super::search::Search;
 use crate::explain::effects::{Effect, UNKNOWN, a_form_explains_more, leaves_a_force};
 use crate::explain::evidence::{EQUAL, Fit, SCORE_MIN};

@@ -2,8 +2,8 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::acceptance::{Refusal, is_accepted, may_be};
-use super::outcome::{SearchOutcome, SearchRound, round_of};
+use super::acceptance::{is_accepted, may_be};
+use super::outcome::{Refusal, SearchOutcome, SearchRound, round_of};
 use super::search::Search;
 use super::trying::Asked;
 use crate::explain::effects::{effect_of, policy_of};

@@ -7,8 +7,7 @@ use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::acceptance::model_penalty;
-use super::outcome::{EffectTrial, SearchOutcome, round_of};
+use super::outcome::{EffectTrial, SearchOutcome, model_penalty, round_of};
 use crate::explain::effects::Effect;
 use crate::explain::evidence::{EQUAL, Fit, FitProblem, RunData, UpdatedModel};
 use crate::explain::scan::Scan;

@@ -7,8 +7,8 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::acceptance::{CERTAIN, Refusal, is_accepted, penalty};
-use super::outcome::{EffectTrial, SearchOutcome};
+use super::acceptance::{CERTAIN, is_accepted};
+use super::outcome::{EffectTrial, Refusal, SearchOutcome, penalty};
 use super::search::Search;
 use crate::explain::effects::{SharedHypothesis, policy_of};
 use crate::explain::evidence::Fit;

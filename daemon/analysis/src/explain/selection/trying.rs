@@ -4,8 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::acceptance::{discounted, penalty};
-use super::outcome::EffectTrial;
+use super::outcome::{EffectTrial, discounted, penalty};
 use super::search::{RoundSteps, Search};
 use crate::explain::effects::{Candidate, Effect, LIBRARY, UNKNOWN};
 use crate::explain::evidence::{Fit, Noise};

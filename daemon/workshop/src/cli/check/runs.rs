@@ -14,7 +14,7 @@ use dynocar_analysis::dataset::{
     DatasetDiagnostic, DatasetError, Manifest, Phases, Quantity, Role, Run, RunQuality,
     dataset_diagnostic, formats,
 };
-use dynocar_analysis::explain::report::windows::AlongLine;
+use dynocar_analysis::explain::report::residual_line::AlongLine;
 use dynocar_core::plausibility::InputFault;
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;

@@ -15,7 +15,6 @@ use super::{Candidate, Certainty, Hypothesis, Nature, On, Policy, Proposal, Shar
 use crate::explain::answer::{Location, RunWindow};
 use crate::explain::evidence::SampleForces;
 use crate::explain::places::{Axis, IntervalEnd, Reach};
-
 use crate::explain::scan::{Scan, Tuple};
 
 /// Number of dragging brakes that hardly have the same time since departure in most runs by chance.

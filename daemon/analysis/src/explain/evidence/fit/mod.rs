@@ -12,11 +12,13 @@ use std::sync::{Arc, OnceLock};
 use dynocar_model::train::Davis;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::model::{Response, UpdatedForces, UpdatedModel};
+use super::integral::Response;
+use super::model::{UpdatedForces, UpdatedModel};
 use super::noise::{Noise, RunScatter};
 use super::run_data::{Density, RunData, RunDataError, prepare_at};
+use super::run_scatter::SharedFilters;
 use super::run_scatter::{
-    DeviationColumns, FactorMatrix, RunFactors, SharedFilters, WeightedFilter, scatter_columns,
+    DeviationColumns, FactorMatrix, RunFactors, WeightedFilter, scatter_columns,
 };
 use super::whitener::BinWhitener;
 use crate::dataset::{Dataset, Role};

@@ -7,7 +7,8 @@ use std::ops::Range;
 
 use dynocar_model::force::mps2_per_n_per_kn;
 
-use super::super::model::{Response, UpdatedModel};
+use super::super::integral::Response;
+use super::super::model::UpdatedModel;
 use super::super::run_data::RunData;
 use crate::explain::hypothesis::{Handling, OnOthers, SharedHypothesis};
 

@@ -3,7 +3,7 @@
 
 mod panels;
 
-use dynocar_analysis::explain::report::windows::AlongLine;
+use dynocar_analysis::explain::report::residual_line::AlongLine;
 use dynocar_model::track::Track;
 use plotters::element::{PathElement, Text};
 use plotters::style::text_anchor::{HPos, VPos};
@@ -172,7 +172,7 @@ mod tests {
     use super::*;
     use dynocar_analysis::dataset::parse_track;
     use dynocar_analysis::explain::report::panels::PanelBin;
-    use dynocar_analysis::explain::report::windows::{FoundPlace, MarkedInterval};
+    use dynocar_analysis::explain::report::residual_line::{FoundPlace, MarkedInterval};
 
     const LINE: &str = "[track]\nname = \"A & B\"\nlength_m = 2000\n\
         gradient = [[0, 10.0], [1000, -5.0]]\ncurves = [[500, 700, 400]]\n\

@@ -1,7 +1,7 @@
 //! The declared and the found properties of a line: their data, their range, their readings at a pointer.
 
 use dynocar_analysis::explain::report::panels::PanelBin;
-use dynocar_analysis::explain::report::windows::{AlongLine, MarkedInterval};
+use dynocar_analysis::explain::report::residual_line::{AlongLine, MarkedInterval};
 use dynocar_model::track::{StepProfile, Track};
 use dynocar_model::words::stretch;
 use plotters::element::{PathElement, Rectangle, Text};

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::super::super::model::integrate_bins;
+use super::super::super::integral::integrate_bins;
 use super::super::plan::At;
 use super::{RunMemory, Scratch, Together, is_near, with_scratch};
 use crate::explain::hypothesis::{Handling, OnOthers, SharedHypothesis};

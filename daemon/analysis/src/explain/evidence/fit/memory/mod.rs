@@ -10,7 +10,9 @@ use std::cell::RefCell;
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::super::model::{Response, UpdatedForces, integrate_bins};
+use super::super::integral::Response;
+use super::super::integral::integrate_bins;
+use super::super::model::UpdatedForces;
 use super::super::run_data::RunData;
 use super::plan::{At, Plan};
 use crate::explain::hypothesis::{Handling, SharedHypothesis};
