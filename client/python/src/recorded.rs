@@ -19,7 +19,7 @@ use dynocar_model::simulate::Restart;
 use dynocar_shared::{SampleField, TrainId};
 use dynocar_workshop::cli::explained_runs::ExplainedRuns;
 use dynocar_workshop::cli::{check as checking, explain as command, identify as identifying};
-use dynocar_workshop::report::images::images;
+use dynocar_workshop::report::page::images;
 use dynocar_workshop::report::provenance::command_line;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;

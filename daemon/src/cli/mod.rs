@@ -5,7 +5,6 @@
 //! 1 the work failed, 2 the command line or an input file is wrong; `health` has some of its own.
 
 pub mod check;
-mod demo;
 mod failure;
 mod health;
 pub mod models;
@@ -38,7 +37,7 @@ struct Arguments {
 /// (`tests/e2e/two_programs.rs`).
 #[derive(Debug, Subcommand)]
 enum Command {
-    Demo(demo::DemoArguments),
+    Demo(run::DemoArguments),
     /// Describe your train and your CSV recordings as TOML files.
     Init(Passed),
     /// Import trains and lines of railtoolkit, TTOBench or OSRD.
@@ -88,7 +87,7 @@ impl Command {
         let workshop = |command, passed| become_it(WORKSHOP, Some(command), passed);
         let recording = |command, passed| become_it(RECORDING, Some(command), passed);
         match self {
-            Command::Demo(arguments) => demo::execute(arguments),
+            Command::Demo(arguments) => run::execute_demo(arguments),
             Command::Run(arguments) => run::execute(arguments),
             Command::Health(arguments) => health::execute(arguments),
             Command::Check(arguments) => check::execute(arguments),

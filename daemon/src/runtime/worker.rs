@@ -11,8 +11,7 @@ use dynocar_transport::channel::{Receiver, SampleCount, Sender, Sleeper, Transpo
 use dynocar_transport::{ChannelError, Host, monotonic_now_ns};
 
 use super::exchange::Exchange;
-use super::log_details::LogDetails;
-use super::tally::Tally;
+use super::tally::{LogDetails, Tally};
 use crate::config::{IdleStrategy, ThreadConfig};
 
 /// Number of polls between two readings of the clock while a thread finds no sample. Reading the clock takes as long

@@ -10,11 +10,10 @@
 //! - [`scan`], [`places`]: the gain of a force of a given shape, and the interval, runs or window of time where it acts
 //! - [`selection`]: the search for effects, their significance, the evidence of each run, and the finished model fitted
 //!   jointly with the usual errors
-//! - [`score`], [`stop_to_stop`]: open-loop prediction of fit and holdout runs
+//! - [`score`], [`stop_to_stop`]: open-loop prediction of fit and holdout runs, and the meaning of an effect
 //! - [`many`]: with many runs, some of them for the search, all of them for sizes and scores
 //! - [`course`], [`over_time`], [`held_out`]: numbers that differ between runs, and confirmation by the holdout runs
-//! - [`unexplained`], [`competing`], [`meaning`], [`caveats`], [`verdict`], [`answer`]: the
-//!   statement
+//! - [`unexplained`], [`competing`], [`caveats`], [`verdict`], [`answer`]: the statement
 //! - [`report`]: further contents of a report
 //!
 //! [`explain`] runs it all.
@@ -31,7 +30,6 @@ pub mod held_out;
 pub mod hypothesis;
 mod location;
 pub mod many;
-pub mod meaning;
 pub mod over_time;
 pub mod places;
 pub mod report;

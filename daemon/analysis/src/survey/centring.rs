@@ -3,8 +3,7 @@
 use super::alignment::Alignment;
 use super::banded::Banded;
 use super::recording::SurveyRecording;
-use super::silence::GAP_MAX_M;
-use super::tracking::{PlacedFix, follow};
+use super::tracking::{GAP_MAX_M, PlacedFix, follow};
 use crate::statistics::median;
 
 /// Standard deviation in m of a fix, which fades slowly.

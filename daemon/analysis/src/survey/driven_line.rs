@@ -4,8 +4,7 @@ use super::alignment::{Alignment, distance_squared};
 use super::both_directions::{Compared, compare};
 use super::centring::{SurveyPass, align};
 use super::recording::{RecordingPart, SAME_ALIGNMENT_M, SurveyRecording};
-use super::silence::{TracePoint, filled, trace};
-use super::tracking::follow;
+use super::tracking::{TracePoint, filled, follow, trace};
 use crate::parallel;
 
 /// Greatest number of parts that are tried as the line, and of parts with which each is compared.

@@ -8,9 +8,9 @@
 //! # Layout, in the order of reading
 //!
 //! - [`recording`]: recordings and their one-way parts, on a plane in metres
-//! - [`alignment`], `silence`, `tracking`, `centring`, `both_directions`, [`driven_line`]: the line that
+//! - [`alignment`], `tracking`, `centring`, `both_directions`, [`driven_line`]: the line that
 //!   is driven repeatedly
-//! - [`chainage`]: a chainage for every row; [`stops`]: places where the passes stop
+//! - [`chainage`]: a chainage for every row; [`trips`]: one-way trips, and the places where they stop
 //! - [`observation`], [`profile`], [`learn`]: gradient, resistance, mass,
 //!   time offset and friction brake from the balance of forces; [`normal`], [`banded`]: its unknown heights,
 //!   their equations and the solver
@@ -27,8 +27,6 @@ pub mod normal;
 pub mod observation;
 pub mod profile;
 pub mod recording;
-mod silence;
-pub mod stops;
 mod surveying;
 mod tracking;
 pub mod trips;

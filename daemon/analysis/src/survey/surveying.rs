@@ -9,8 +9,7 @@ use super::normal::{HeightLayout, LineCourse};
 use super::observation::{BlockDifference, Prior, observations};
 use super::profile::{Altitude, ProfileEvidence, is_one_of_few};
 use super::recording::{RawRecording, RecordingPart, SurveyRecording, plane_of, recording_parts};
-use super::stops::{SurveyedStop, stands, stops};
-use super::trips::{NotUsed, Trip, not_used, trips};
+use super::trips::{NotUsed, SurveyedStop, Trip, not_used, stands, stops, trips};
 use crate::parallel;
 use crate::statistics::rms;
 

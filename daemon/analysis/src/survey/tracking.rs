@@ -1,7 +1,8 @@
-//! Following a recording along an alignment: a chainage for each fix.
+//! A chainage for each fix: following a recording along an alignment, with gaps of the fixes filled by the path of
+//! another pass.
 
 use super::alignment::{Alignment, Foot, distance_squared};
-use super::recording::{Fix, SAME_ALIGNMENT_M, SurveyRecording};
+use super::recording::{Fix, RecordingPart, SAME_ALIGNMENT_M, SurveyRecording};
 use crate::statistics::least_first;
 
 /// Window in m around the expected chainage in which a fix is placed.
@@ -164,4 +165,147 @@ fn offsets(
         }
     }
     Some(offsets)
+}
+
+/// Distance in m between fixes along the path above which the path between them is open.
+pub const GAP_MAX_M: f64 = 150.0;
+/// Greatest length of a path that fills a gap, as a multiple of the straight line between its ends.
+const DETOUR_MAX: f64 = 3.0;
+
+/// A point on the path of a part.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TracePoint {
+    /// East and north in m.
+    pub at_m: [f64; 2],
+    /// True where no fix shows the point, only a straight line over a gap.
+    pub is_open: bool,
+}
+
+/// Points every `step_m` along a part.
+pub fn trace(part: &RecordingPart, recordings: &[SurveyRecording], step_m: f64) -> Vec<TracePoint> {
+    let recording = &recordings[part.recording];
+    let silences: Vec<(f64, f64)> = recording
+        .fixes
+        .windows(2)
+        .map(|pair| (recording.travelled_m[pair[0].row], recording.travelled_m[pair[1].row]))
+        .filter(|(from_m, to_m)| to_m - from_m > GAP_MAX_M)
+        .collect();
+    let is_open = |travelled_m: f64| {
+        let next = silences.partition_point(|silence| silence.1 <= travelled_m);
+        silences.get(next).is_some_and(|silence| silence.0 < travelled_m)
+    };
+    let points = recording.points(step_m).into_iter();
+    let within = points.filter(|point| (part.from_m..=part.to_m).contains(&point.0));
+    within.map(|(travelled_m, at_m)| TracePoint { at_m, is_open: is_open(travelled_m) }).collect()
+}
+
+/// Returns the path of one trace, with its gaps filled from the other traces by the shortest path between the ends of
+/// each gap. A gap that no other trace covers stays a straight line.
+pub fn filled(one: usize, traces: &[Vec<TracePoint>]) -> Vec<[f64; 2]> {
+    let own = &traces[one];
+    let mut path: Vec<[f64; 2]> = Vec::with_capacity(own.len());
+    let mut next = 0;
+    while next < own.len() {
+        let end = (next..own.len()).find(|&at| !own[at].is_open).unwrap_or(own.len());
+        let straight = own[next..end].iter().map(|point| point.at_m);
+        if end > next && next > 0 && end < own.len() {
+            let ends = [own[next - 1].at_m, own[end].at_m];
+            let others = traces.iter().enumerate().filter(|(other, _)| *other != one);
+            let paths = others.filter_map(|(_, trace)| between(ends, trace));
+            let shortest = paths.min_by(|one, other| one.0.total_cmp(&other.0));
+            match shortest {
+                Some((_, inside)) => path.extend(inside),
+                None => path.extend(straight),
+            }
+        } else {
+            path.extend(straight);
+        }
+        path.extend(own.get(end).map(|point| point.at_m));
+        next = end + 1;
+    }
+    path
+}
+
+/// Returns the length in m and the points of a trace's path between two places, driven in either direction; `None`
+/// where the trace itself has a gap there.
+fn between(ends: [[f64; 2]; 2], trace: &[TracePoint]) -> Option<(f64, Vec<[f64; 2]>)> {
+    let nearest = |place: [f64; 2]| {
+        let distances =
+            trace.iter().enumerate().map(|(at, it)| (at, distance_squared(it.at_m, place)));
+        let (at, squared) = distances.min_by(|one, other| one.1.total_cmp(&other.1))?;
+        (squared < SAME_ALIGNMENT_M * SAME_ALIGNMENT_M).then_some(at)
+    };
+    let (from, to) = (nearest(ends[0])?, nearest(ends[1])?);
+    let inside = &trace[from.min(to)..=from.max(to)];
+    if inside.iter().any(|point| point.is_open) {
+        return None;
+    }
+    let mut points: Vec<[f64; 2]> = inside.iter().map(|point| point.at_m).collect();
+    if to < from {
+        points.reverse();
+    }
+    let length_m: f64 =
+        points.windows(2).map(|pair| distance_squared(pair[0], pair[1]).sqrt()).sum();
+    let straight_m = distance_squared(ends[0], ends[1]).sqrt();
+    (length_m < DETOUR_MAX * straight_m).then_some((length_m, points))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns a quarter of a circle with a radius of 1 km less `left_m`, about 20 m from point to point.
+    fn quarter(left_m: f64, open: std::ops::Range<usize>) -> Vec<TracePoint> {
+        let point = |k: usize| {
+            let angle = 0.02 * k as f64;
+            let radius_m = 1000.0 - left_m;
+            let at_m = [radius_m * angle.sin(), radius_m * (1.0 - angle.cos())];
+            TracePoint { at_m, is_open: open.contains(&k) }
+        };
+        (0..79).map(point).collect()
+    }
+
+    /// Returns the same with a straight line over the open points.
+    fn silent(open: std::ops::Range<usize>) -> Vec<TracePoint> {
+        let mut trace = quarter(0.0, open.clone());
+        let (from, to) = (trace[open.start - 1].at_m, trace[open.end].at_m);
+        for k in open.clone() {
+            let share = (k + 1 - open.start) as f64 / (open.len() + 1) as f64;
+            trace[k].at_m = [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis]));
+        }
+        trace
+    }
+
+    fn farthest_from_circle_m(path: &[[f64; 2]]) -> f64 {
+        let off = |at: &[f64; 2]| (at[0].hypot(1000.0 - at[1]) - 1000.0).abs();
+        path.iter().map(off).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_silence_is_filled_from_a_pass_of_either_direction_that_heard_more() {
+        let mut back = quarter(4.0, 60..70);
+        back.reverse();
+        let traces = [silent(20..50), quarter(2.0, 40..45), back];
+        assert!(farthest_from_circle_m(&silent(20..50).map_at()) > 40.0);
+        let path = filled(0, &traces);
+        assert!(farthest_from_circle_m(&path) < 5.0, "{}", farthest_from_circle_m(&path));
+        let steps = path.windows(2).map(|pair| distance_squared(pair[0], pair[1]).sqrt());
+        assert!(steps.fold(0.0, f64::max) < 45.0, "no jump");
+    }
+
+    #[test]
+    fn where_nobody_heard_the_straight_line_stays() {
+        let traces = [silent(20..50), quarter(0.0, 30..35)];
+        assert_eq!(filled(0, &traces), traces[0].map_at());
+    }
+
+    trait MapAt {
+        fn map_at(&self) -> Vec<[f64; 2]>;
+    }
+
+    impl MapAt for Vec<TracePoint> {
+        fn map_at(&self) -> Vec<[f64; 2]> {
+            self.iter().map(|point| point.at_m).collect()
+        }
+    }
 }

@@ -14,7 +14,6 @@ pub mod motion;
 pub mod output;
 pub mod settings;
 pub mod train_kalman;
-mod usable;
 
 pub use estimator::{Echo, Estimator, Outcome};
 pub use judge::InnovationMonitor;
@@ -29,7 +28,7 @@ use dynocar_model::train::TrainModel;
 use dynocar_shared::{ParameterSnapshot, Reason, TrainId, TrainSample};
 
 use self::admission::Admission;
-use self::usable::Usable;
+use self::output::Usable;
 use crate::plausibility::DetectedFault;
 
 /// One estimator for one train, from [`TrainSample`] to [`ParameterSnapshot`].

@@ -5,7 +5,6 @@ pub mod brakes;
 pub mod check;
 mod convert;
 pub mod explain;
-mod explained;
 pub mod explained_runs;
 pub mod fmu;
 pub mod identify;

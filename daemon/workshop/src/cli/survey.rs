@@ -9,7 +9,7 @@ use dynocar::dataset::DatasetSource;
 use dynocar::output::{give, report_line, require_files, require_folder, write_file};
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::survey::profile::GradientEntry;
-use dynocar_analysis::survey::stops::SurveyedStop;
+use dynocar_analysis::survey::trips::SurveyedStop;
 use dynocar_analysis::survey::{NotUsed, Survey};
 use dynocar_model::words::number;
 use dynocar_shared::{HALF_95, TrainId};

@@ -3,17 +3,16 @@
 //!
 //! # Layout
 //!
-//! - [`mod@page`]: the page from top to bottom; the survey's and the learner's have its head and policy too
+//! - [`mod@page`]: the page from top to bottom; the survey's and the learner's have its head and policy too; and
+//!   its plots as separate files
 //! - [`sections`]: the sections of the page
 //! - [`plots`]: the plots, as SVG text
-//! - [`mod@images`]: the plots as separate files
 //! - [`html`]: parts of pages: tables, sections, numbers
 //! - [`provenance`]: command, versions, content hash
 //! - `style.css`: the style, for wide and narrow, light and dark, screen and paper
 //! - `plots.js`: values at the pointer and zoom
 
 pub mod html;
-pub mod images;
 pub mod page;
 pub mod plots;
 pub mod provenance;

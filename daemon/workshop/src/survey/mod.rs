@@ -13,7 +13,7 @@ use dynocar::dataset::DatasetSource;
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::answer::WithStd;
 use dynocar_analysis::statistics::middle;
-use dynocar_analysis::survey::stops::SurveyedStop;
+use dynocar_analysis::survey::trips::SurveyedStop;
 use dynocar_analysis::survey::{NotUsed, Survey, Trip, Vehicle, survey};
 use read::{Material, rows_in_order};
 use serde::Serialize;

@@ -15,7 +15,7 @@ use dynocar_analysis::dataset::{
 use dynocar_analysis::survey::alignment::FoundCurve;
 use dynocar_analysis::survey::normal::HEIGHT_STEP_M;
 use dynocar_analysis::survey::profile::GradientEntry;
-use dynocar_analysis::survey::stops::SurveyedStop;
+use dynocar_analysis::survey::trips::SurveyedStop;
 use dynocar_analysis::survey::{Survey, SurveyedProfile, Trip};
 use dynocar_model::train::numbers::{
     DAVIS_A, DAVIS_B, DAVIS_C, FORCE_PER_PRESSURE, MASS, PASSENGER_MASS, RELEASE_PRESSURE,

@@ -8,7 +8,6 @@
 
 mod adjoint;
 mod bins;
-mod cleaning;
 mod criterion;
 mod drift;
 mod fit;

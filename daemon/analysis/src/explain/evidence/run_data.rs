@@ -15,11 +15,11 @@ use crate::dataset::{
 use crate::statistics::span;
 
 use super::bins::{self, Bin};
-use super::cleaning;
+
 use super::drift::drift_m;
 use super::positions::{by_part_s, distance_ratio};
 use super::sample_forces::DeclaredForces;
-use super::thinning::{MEAN_S, thinned};
+use super::thinning::{MEAN_S, clean, thinned};
 
 /// A run, ready for fitting and for open-loop simulation.
 #[derive(Clone, Debug)]
@@ -207,7 +207,7 @@ impl Reader {
         let first_ns = samples.first().map_or(0, |sample| sample.time_ns);
         let time_s: Vec<f64> =
             samples.iter().map(|sample| (sample.time_ns - first_ns) as f64 * 1e-9).collect();
-        let replaced = cleaning::clean(&mut samples, bins::sampling_period_s(&time_s));
+        let replaced = clean(&mut samples, bins::sampling_period_s(&time_s));
         (samples, replaced)
     }
 }

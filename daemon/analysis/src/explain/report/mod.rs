@@ -2,7 +2,7 @@
 //!
 //! # Layout, in the order of the page
 //!
-//! - [`sentence`]: the verdict in a plain sentence
+//! - [`sentence`]: the verdict in a plain sentence, and other explanations
 //! - [`effect`]: an effect in words
 //! - [`errors`]: open-loop errors before and after, with bootstrap intervals
 //! - [`windows`], [`covariates`], [`panels`]: the residual as a force, window by window, against
@@ -10,12 +10,10 @@
 //! - [`residual_line`]: the residual along the line, by direction, with the places found
 //! - [`timeline`]: the explanation as events and series in time, speeds of runs
 //! - [`parameters`]: fitted values, with uncertainty
-//! - [`candidates`]: other explanations
 //!
 //! The quality of a run's data is in the dataset itself ([`RunQuality`](crate::dataset::RunQuality)) and in
 //! [`RunData`](super::evidence::RunData).
 
-pub mod candidates;
 pub mod covariates;
 pub mod effect;
 pub mod errors;
@@ -28,12 +26,12 @@ pub mod windows;
 
 use super::Explanation;
 use crate::dataset::Dataset;
-use candidates::CandidateRow;
 use errors::Errors;
 use panels::Panel;
 pub use parameters::IntervalEstimate;
 use parameters::{ParameterRow, PlaceTable};
 use residual_line::AlongLine;
+use sentence::CandidateRow;
 use timeline::Trace;
 
 /// Everything that a report shows beyond the answer and the dataset's own account.
@@ -69,7 +67,7 @@ impl ReportData {
             line: AlongLine::new(explanation, &windows),
             parameters: parameters::rows(dataset, explanation),
             places: PlaceTable::from_explanation(explanation),
-            candidates: candidates::rows(explanation),
+            candidates: sentence::candidate_rows(explanation),
             errors,
         }
     }

@@ -2,8 +2,8 @@
 
 use dynocar_analysis::explain::caveats::not_held;
 use dynocar_analysis::explain::evidence::SCORE_MIN;
-use dynocar_analysis::explain::report::candidates::CandidateRow;
 use dynocar_analysis::explain::report::parameters::{ParameterRow, PlaceRow, PlaceRuns};
+use dynocar_analysis::explain::report::sentence::CandidateRow;
 use dynocar_model::words::{joined, number};
 
 use super::PageSection;
