@@ -57,7 +57,7 @@ impl RecordedDataset {
         self.files.iter().map(|it| it.0.as_str())
     }
 
-    /// Returns the bytes of a file as [`unpack`](super::unpack) writes it; `None` where there is none.
+    /// Returns the bytes of a file as [`unpack`] writes it; `None` where there is none.
     pub fn bytes(&self, path: &str) -> Option<Cow<'_, [u8]>> {
         Some(match self.file(path)? {
             FileContent::Bytes(bytes) => bytes.into(),
