@@ -1,6 +1,6 @@
 //! The functions that a simulator calls, by the FMI standard 2.0 for co-simulation.
 //!
-//! Thin on purpose: each function checks its pointers and calls the [`Model`](crate::Model) behind the instance. A
+//! Thin on purpose: each function checks its pointers and calls the [`Model`] behind the instance. A
 //! refusal is reported to the simulator's logger in words and answered by [`Status::Error`]; no panic crosses the
 //! boundary.
 //!
