@@ -53,9 +53,9 @@ struct Chain {
     row_before: Option<MomentumColumns>,
 }
 
-/// Builds [`CoastingSegment`]s from samples.
+/// Builder of coasting segments from samples.
 #[derive(Clone, Debug, PartialEq)]
-pub struct CoastingSegments {
+pub(crate) struct CoastingSegments {
     settings: DataSettings,
     watch: SpeedWatch,
     chain: Option<Chain>,
