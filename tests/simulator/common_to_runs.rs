@@ -132,6 +132,17 @@ fn a_gain_stays_right_where_a_run_that_is_not_searched_goes_further_than_the_oth
 }
 
 #[test]
+fn a_wheel_is_found_beside_four_small_errors_that_many_runs_make_certain() {
+    let wheel = vec![EffectKind::WheelDiameter];
+    let settings = SimulatorSettings::new(9_900_006, EffectRequest::Kinds(wheel));
+    let deviations = TrueDeviations::ROUGHER;
+    let settings = SimulatorSettings { runs: 32, holdout_runs: 8, deviations, ..settings };
+    let truth = simulate(&settings).effects[0].parameters(0.0)["speed_scale"].as_f64().unwrap();
+    let found = parameter(&explained_of(32, settings), EffectKind::WheelDiameter, "speed_scale");
+    assert!((found - truth).abs() < 0.003, "{found} for {truth}");
+}
+
+#[test]
 fn a_wind_beside_the_usual_errors_of_the_map_is_no_error_of_the_map() {
     let settings = SimulatorSettings::new(9_600_003, EffectRequest::Kinds(vec![EffectKind::Wind]));
     let answer =

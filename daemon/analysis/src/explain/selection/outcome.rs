@@ -11,8 +11,8 @@ use crate::explain::effects::{AtBound, SharedHypothesis};
 use crate::explain::evidence::{Fit, acceptance_score};
 use crate::statistics::rms;
 
-/// Greatest number of named effects.
-const EFFECTS_MAX: usize = 4;
+/// Greatest number of named effects. Small errors of declared figures that many runs make certain are among them.
+const EFFECTS_MAX: usize = 6;
 
 /// One candidate, fitted together with everything accepted so far.
 #[derive(Clone)]
