@@ -122,8 +122,10 @@ impl Search<'_> {
         }
         let looked = self.with_map_as_fitted(&outcome.fit, joint);
         let fallen = outcome.fallen_kinds();
-        let is_sought =
-            |kind: EffectKind| policy_of(kind).is_sought_with_nuisance && !fallen.contains(&kind);
+        let is_sought = |kind: EffectKind| {
+            let is_sought = policy_of(kind).is_sought_with_nuisance && outcome.may_add(kind);
+            is_sought && !fallen.contains(&kind)
+        };
         let tried = self.round_of(
             &looked,
             &mut Vec::new(),

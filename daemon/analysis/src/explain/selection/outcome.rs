@@ -13,6 +13,9 @@ use crate::statistics::rms;
 
 /// Greatest number of named effects. Small errors of declared figures that many runs make certain are among them.
 const EFFECTS_MAX: usize = 6;
+/// Number of effects from which a remaining force is no longer looked for without a name: the remainder of four
+/// effects, each a little off, has some form in any data.
+const FORMLESS_FROM: usize = 4;
 
 /// One candidate, fitted together with everything accepted so far.
 #[derive(Clone)]
@@ -151,6 +154,12 @@ impl SearchOutcome {
     /// Returns whether nothing more is looked for.
     pub(super) fn is_full(&self) -> bool {
         self.fit.model.effects.len() >= EFFECTS_MAX + self.small.len()
+    }
+
+    /// Returns whether a kind may be added: any, but a force without a name only to a few effects.
+    pub(super) fn may_add(&self, kind: EffectKind) -> bool {
+        kind != EffectKind::Unknown
+            || self.fit.model.effects.len() < FORMLESS_FROM + self.small.len()
     }
 
     /// Returns whether an effect of the model may be removed or replaced by another kind.

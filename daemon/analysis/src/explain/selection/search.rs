@@ -120,6 +120,9 @@ impl Search<'_> {
         // Kinds that others replaced at once are not tried again either.
         let mut fruitless = outcome.fallen_kinds();
         while !outcome.is_full() && outcome.rounds.len() < most {
+            if !outcome.may_add(EffectKind::Unknown) {
+                fruitless.push(EffectKind::Unknown);
+            }
             let trials = self.round(&outcome.fit, &mut outcome.not_testable);
             let next = self.best(&trials, &fruitless).map(|trial| (trial.kind, trial.fit.clone()));
             let small = next.is_none().then(|| self.with_certain_and_small(&trials)).flatten();
