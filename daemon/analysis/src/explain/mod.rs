@@ -219,9 +219,9 @@ impl Prepared {
     /// Makes the runs of a dataset ready: once, and once more for each correction of their forces that is found.
     fn new(declared: &Dataset, density: Density) -> Result<Self, RunDataError> {
         let step_s = declared.step_s();
-        let is_sought =
-            force_time::is_sought(step_s) || declared.runs.iter().any(|run| run.power().is_some());
-        let first = if is_sought { Density::Recorded } else { density };
+        let is_time_open = force_time::is_sought(step_s);
+        let has_power = declared.runs.iter().any(|run| run.power().is_some());
+        let first = if is_time_open || has_power { Density::Recorded } else { density };
         let (mut problem, mut holdout) = FitProblem::of(declared, first)?;
         let mut dataset = Cow::Borrowed(declared);
         let estimated_drive = drive_efficiency::estimated(&problem, declared.train.drive);
@@ -229,8 +229,7 @@ impl Prepared {
             dataset = Cow::Owned(dataset.with_drive(*drive));
             (problem, holdout) = FitProblem::of(&dataset, Density::Recorded)?;
         }
-        let is_sought = force_time::is_sought(step_s);
-        let late = is_sought.then(|| force_time::estimated(&problem, step_s)).flatten();
+        let late = if is_time_open { force_time::estimated(&problem, step_s) } else { None };
         if let Some(late) = late {
             dataset = Cow::Owned(dataset.with_forces_moved(late.value));
         }

@@ -138,13 +138,14 @@ fn a_table_of_another_release_or_without_a_column_or_with_another_is_named() {
 }
 
 #[test]
-fn nothing_is_overwritten_and_parquet_is_not_converted_into_itself() {
+fn nothing_is_overwritten_and_no_format_is_converted_into_itself() {
     let folder = tempfile::tempdir().unwrap();
     recording(folder.path());
     let shown = |name: &str| folder.path().join(name).display().to_string();
     let cases = [
         ("run.mcap", "run.parquet", "exists already"),
         ("run.parquet", "other.parquet", "it is Parquet already"),
+        ("run.mcap", "other.mcap", "it is MCAP already"),
         ("run.parquet", "run.mcap", "exists already"),
     ];
     for (from, to, expected) in cases {

@@ -50,15 +50,15 @@ pub fn execute(arguments: &ConvertArguments) -> Result<(), Failure> {
     let source = formats::of_recording(from);
     let shown = output.display();
     let files = ModelFiles { train: train_file.clone(), track: track_file.clone() };
-    let written_as = formats::of_extension(output);
-    if let Some((format, exchange)) =
-        written_as.and_then(|it| Some((it.format, it.exchange.as_ref()?)))
-    {
-        if let Some(own) = from.iter().find(|it| format.is_of(it)) {
+    if let Some(written_as) = formats::of_extension(output) {
+        let format = written_as.format;
+        if let Some(own) = from.iter().find(|it| dataset.is_none() && format.is_of(it)) {
             let words = format!("{}: it is {} already", own.display(), format.name);
             return Err(Failure::Input(words));
         }
-        return from_mcap(arguments, dataset, exchange);
+        if let Some(exchange) = &written_as.exchange {
+            return from_mcap(arguments, dataset, exchange);
+        }
     }
     let unpacked = match (dataset, &source.exchange) {
         (Some(dataset), _) => {
