@@ -33,10 +33,12 @@ struct Workplace {
 impl Workplace {
     /// No run lies there yet.
     fn from_kinds(kinds: &[EffectKind]) -> Self {
+        Self::new(&SimulatorSettings::new(SEED, EffectRequest::Kinds(kinds.to_vec())))
+    }
+
+    fn new(settings: &SimulatorSettings) -> Self {
         let site = DaemonSite::new();
-        let simulated =
-            simulate(&SimulatorSettings::new(SEED, EffectRequest::Kinds(kinds.to_vec())));
-        let files = dataset_files(&simulated);
+        let files = dataset_files(&simulate(settings));
         for name in ["train.toml", "track.toml"] {
             site.write(name, text(&files, name));
         }
@@ -94,6 +96,17 @@ impl Workplace {
         let words: Vec<&str> =
             arguments.iter().map(String::as_str).chain(more.iter().copied()).collect();
         self.site.start(DYNOCAR, &words)
+    }
+
+    /// Those of a learner within this process.
+    fn settings(&self, declared: ModelText, bounds: Bounds) -> LearnerSettings {
+        LearnerSettings {
+            store: Store::at(&self.path("models")),
+            runs: self.path("runs"),
+            trains: vec![(TRAIN, declared)],
+            bounds,
+            command: String::new(),
+        }
     }
 
     fn models(&self) -> TrainModels {
@@ -321,15 +334,37 @@ fn a_signal_ends_a_learner_in_the_middle_of_an_explanation_and_nothing_is_conclu
 }
 
 #[test]
+fn where_some_runs_show_no_effect_all_of_them_are_explained_but_those_that_cannot_be_read() {
+    let kinds = EffectRequest::Kinds(vec![EffectKind::WheelDiameter]);
+    let work = Workplace::new(&SimulatorSettings {
+        runs: 48,
+        duration_s: 300.0,
+        ..SimulatorSettings::new(SEED, kinds)
+    });
+    work.record("all", 0..48);
+    let text = |name| std::fs::read_to_string(work.path(name)).unwrap();
+    let declared = ModelText { train: text("train.toml"), track: Some(text("track.toml")) };
+    let learn = |bounds: Bounds| {
+        let mut learner = Learner::open(work.settings(declared.clone(), bounds)).unwrap();
+        learner.round(SystemTime::now(), &|| false).unwrap().trains.remove(0).outcome
+    };
+    let few = Bounds { runs: 1, ..Bounds::default() };
+    std::fs::write(work.path("runs/all/runs/03.csv"), "time_s,speed_mps\n0,nowhere\n").unwrap();
+    let outcome = learn(Bounds { samples: 2_000, ..few });
+    assert!(learned(&work.models()).is_empty(), "too many samples for the memory: {outcome:?}");
+    std::fs::remove_dir_all(work.path("models")).unwrap();
+    let outcome = learn(few);
+    let [model] = &learned(&work.models())[..] else { panic!("{outcome:?}") };
+    assert_eq!(model.origin.effects[0].kind, "wheel_diameter");
+    let runs = model.origin.files.iter().filter(|file| file.path.ends_with(".csv"));
+    assert_eq!(runs.count(), 47);
+}
+
+#[test]
 fn a_store_has_one_learner() {
     let work = Workplace::from_kinds(&[]);
-    let settings = || LearnerSettings {
-        store: Store::at(&work.path("models")),
-        runs: work.path("runs"),
-        trains: vec![(TRAIN, ModelText { train: "a".into(), track: None })],
-        bounds: Bounds::default(),
-        command: String::new(),
-    };
+    let declared = ModelText { train: "a".into(), track: None };
+    let settings = || work.settings(declared.clone(), Bounds::default());
     let learner = Learner::open(settings()).unwrap();
     assert!(matches!(Learner::open(settings()), Err(LearnError::Taken { .. })));
     let output = work.learn_once(&[]);

@@ -80,11 +80,11 @@ impl ExplainBenchArguments {
 /// One dataset's outcome on standard error.
 fn print_case(case: &SimulatedCase, grade: &Grade) {
     let kinds: Vec<_> = case.scenario.kinds(case.seed).iter().map(|kind| kind.name()).collect();
-    let parameters: Vec<String> = grade
-        .parameters
-        .iter()
-        .map(|p| format!("{} {:+.3} ({:+.1} sd)", p.name, p.error, p.z))
-        .collect();
+    let off = |parameters: &[ParameterGrade]| {
+        let each = parameters.iter();
+        let each = each.map(|p| format!("{} {:+.3} ({:+.1} sd)", p.name, p.error, p.z));
+        each.collect::<Vec<_>>().join(", ")
+    };
     report_line(&format!(
         "{} seed {}: {} {} {} iou {:?} ends {}/{} share {:?} {}",
         if grade.is_right { "right" } else { "WRONG" },
@@ -96,8 +96,11 @@ fn print_case(case: &SimulatedCase, grade: &Grade) {
         grade.ends_held.iter().filter(|held| **held).count(),
         grade.ends_held.len(),
         grade.attained.and_then(|it| it.share),
-        parameters.join(", ")
+        off(&grade.parameters)
     ));
+    if !grade.held_out.is_empty() {
+        report_line(&format!("    by the runs held out {}", off(&grade.held_out)));
+    }
     report_line(&format!("    acceptance score {:.2}", grade.acceptance_score));
     for detail in &grade.details {
         report_line(&format!("    {detail}"));

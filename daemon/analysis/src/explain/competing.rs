@@ -4,7 +4,7 @@ use dynocar_shared::vocabulary::{self, EffectKind};
 
 use super::answer::RunnerUp;
 use super::effects::UNKNOWN;
-use super::evidence::{EQUAL, SCORE_MIN};
+use super::evidence::{EQUAL, Fit, SCORE_MIN};
 use super::selection::{
     EffectTrial, Refusal, Search, SearchOutcome, is_certain_with_nuisance, penalty,
 };
@@ -27,14 +27,17 @@ pub struct CompetingHypotheses {
 ///
 /// A competing hypothesis explains the data as well, would be accepted as the accepted effect was, removes about as
 /// much of the open-loop error, and has nothing left to explain once that effect is in the model: a kind that keeps its
-/// evidence acts jointly with the effect and not in its place. Kinds that no run could distinguish from the effect
-/// compete in any case.
-pub fn competing_hypotheses(outcome: &SearchOutcome) -> Vec<CompetingHypotheses> {
+/// evidence acts jointly with the effect and not in its place. It must fit the runs as well in the finished model, too,
+/// which may separate kinds that looked alike in the search. Kinds that no run could distinguish from the effect compete
+/// in any case.
+pub fn competing_hypotheses(search: &Search, outcome: &SearchOutcome) -> Vec<CompetingHypotheses> {
     let effects = &outcome.fit.model.effects;
     let of = |accepted: EffectKind, tried: &[EffectTrial], twins: &[EffectKind]| {
         let own = tried.iter().find(|trial| trial.kind == accepted);
-        let close =
-            tried.iter().filter(|trial| own.is_some_and(|own| comes_close(trial, own, outcome)));
+        let close = tried.iter().filter(|trial| {
+            own.is_some_and(|own| comes_close(trial, own, outcome))
+                && fits_as_well(search, trial, accepted, outcome)
+        });
         let mut kinds: Vec<EffectKind> = Vec::new();
         for kind in twins.iter().copied().chain(close.map(|trial| trial.kind)) {
             if !outcome.fit.model.has(kind) && !kinds.contains(&kind) {
@@ -58,7 +61,29 @@ pub fn competing_hypotheses(outcome: &SearchOutcome) -> Vec<CompetingHypotheses>
     each.filter(|competing| !competing.kinds.is_empty()).collect()
 }
 
-/// Returns whether a trial could stand in the place of the accepted one.
+/// Returns whether a trial could stand in the place of the accepted one in the finished model, at its own place or at
+/// that of the accepted one.
+fn fits_as_well(
+    search: &Search,
+    trial: &EffectTrial,
+    accepted: EffectKind,
+    outcome: &SearchOutcome,
+) -> bool {
+    let finished = &outcome.likeliest;
+    let Some(index) = finished.model.position(accepted) else { return false };
+    let rest = search.without(finished, index);
+    let (effect, start) = trial.last_parts();
+    let site = finished.model.effects[index].site();
+    let at_its_place = site.and_then(|site| effect.at_site(site.clone()));
+    let price = |fit: &Fit, number: usize| fit.cost + penalty(fit, number);
+    let own = price(finished, index);
+    [Some(effect), at_its_place].into_iter().flatten().any(|effect| {
+        let other = search.problem.grown(&rest, [(effect, start.clone())]);
+        price(&other, other.model.effects.len() - 1) < own + EQUAL
+    })
+}
+
+/// Returns whether a trial could stand in the place of the accepted one as the search saw them.
 fn comes_close(trial: &EffectTrial, accepted: &EffectTrial, outcome: &SearchOutcome) -> bool {
     let last = outcome.rounds.last().into_iter().flat_map(|round| round.iter());
     let left = last.clone().find(|left| left.kind == trial.kind).map_or(0.0, |left| left.evidence);

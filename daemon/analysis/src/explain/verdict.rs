@@ -46,7 +46,7 @@ pub fn answer(
     let effects = effect_answers(search, outcome, known);
     // An effect without a name has no competing hypotheses either.
     let is_unknown = fit.model.has(EffectKind::Unknown);
-    let competing = if is_unknown { Vec::new() } else { competing_hypotheses(outcome) };
+    let competing = if is_unknown { Vec::new() } else { competing_hypotheses(search, outcome) };
     let left = Unexplained::new(search, outcome);
     let verdict = verdict(search, outcome, &competing, left.as_ref());
     let is_enough = verdict != Verdict::InsufficientData;

@@ -9,7 +9,6 @@ use dynocar::models::{
     FoundEffect, MaintenanceEvent, ModelFigure, ModelHash, ModelText, NewModel, Origin,
     TrainModels, UtcSecond,
 };
-use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::Explanation;
 use dynocar_analysis::explain::answer::{EffectAnswer, ExplainAnswer, ParameterValue, Verdict};
 use dynocar_analysis::explain::effects::policy_of;
@@ -330,18 +329,17 @@ fn windows(effect: &EffectAnswer, pool: &Pool, explanation: &Explanation) -> Vec
     });
     let fit_runs = || explanation.problem.runs.iter().map(|run| run.file.clone()).collect();
     let names: Vec<String> = effect.place.runs.clone().or(by_run).unwrap_or_else(fit_runs);
-    names.iter().filter_map(|name| whole(name, &pool.dataset, sha256_of(name))).collect()
-}
-
-fn whole(name: &str, dataset: &Dataset, sha256: String) -> Option<EventWindow> {
-    let run = dataset.runs.iter().find(|run| run.file == name)?;
-    let time_s = |sample: &dynocar_shared::TrainSample| sample.time_ns as f64 * 1e-9;
-    Some(EventWindow {
-        run: name.into(),
-        sha256,
-        t_start_s: time_s(run.samples.first()?),
-        t_end_s: time_s(run.samples.last()?),
-    })
+    let whole = |name: &String| {
+        let mut runs = explanation.problem.runs.iter().chain(&explanation.holdout);
+        let run = runs.find(|run| run.file == *name)?;
+        Some(EventWindow {
+            run: name.clone(),
+            sha256: sha256_of(name),
+            t_start_s: run.offset_s,
+            t_end_s: run.offset_s + run.duration_s(),
+        })
+    };
+    names.iter().filter_map(whole).collect()
 }
 
 /// Returns an event in a sentence for people.

@@ -3,12 +3,10 @@
 use std::fs::{File, TryLockError};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::SystemTime;
 
+use dynocar_analysis::explain::Explanation;
 use dynocar_analysis::explain::answer::Verdict;
-use dynocar_analysis::explain::evidence::RunDataError;
-use dynocar_analysis::explain::{Explanation, explain};
 use dynocar_shared::TrainId;
 use tracing::warn;
 
@@ -188,14 +186,10 @@ impl Learner {
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<Option<RoundOutcome>, LearnError> {
         let text = models.text(in_force)?;
-        let (model, track) = models.load(in_force)?;
-        let (model, track) = (Arc::new(model), track.map(Arc::new));
+        let declared = Declared::new(&text, models.load(in_force)?);
         let mut outcome = RoundOutcome::TooFewRuns;
         for choice in choices {
-            let declared = Declared { text: &text, train: &model, track: track.as_ref() };
-            let read = pool::read(choice, declared, &self.settings.bounds, &mut self.memory);
-            let Some(pool) = read else { continue };
-            let found = match explain_pool(pool, &mut self.memory, stop) {
+            let found = match self.explained_pool(choice, &declared, stop) {
                 Ok(found) => found,
                 Err(Stopped) => return Ok(None),
             };
@@ -229,36 +223,37 @@ impl Learner {
         }
         Ok(Some(outcome))
     }
-}
 
-/// Explains a pool; a run that cannot be used is reported once and left out. `None` where too few are left.
-fn explain_pool(
-    mut pool: Pool,
-    memory: &mut LearnerMemory,
-    stop: &(dyn Fn() -> bool + Sync),
-) -> Result<Option<(Pool, Explanation)>, Stopped> {
-    let progress = |_: f64, _: &str| {
-        if stop() {
-            resume_unwind(Box::new(Stopped));
-        }
-    };
-    loop {
-        let work = AssertUnwindSafe(|| explain(&pool.dataset, &progress));
-        let explained = match catch_unwind(work) {
-            Ok(explained) => explained,
-            Err(cause) if cause.is::<Stopped>() => return Err(Stopped),
-            Err(cause) => resume_unwind(cause),
+    /// Explains a choice of runs; a run that cannot be used is reported once and left out. `None` where too few are
+    /// left.
+    fn explained_pool(
+        &mut self,
+        choice: &[FoundRun],
+        declared: &Declared,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Option<(Pool, Explanation)>, Stopped> {
+        let progress = |_: f64, _: &str| {
+            if stop() {
+                resume_unwind(Box::new(Stopped));
+            }
         };
-        let RunDataError::Simulate { file, source } = match explained {
-            Ok(explanation) => return Ok(Some((pool, explanation))),
-            Err(error) => error,
-        };
-        if let Some(run) = pool.runs.iter().find(|run| run.name == file) {
-            report_unusable(memory, &run.key(), &format!("{file}: {source}"));
-        }
-        match pool.without(&file) {
-            Some(rest) => pool = rest,
-            None => return Ok(None),
+        loop {
+            let read = pool::read(choice, declared, &self.settings.bounds, &mut self.memory);
+            let Some(pool) = read else { return Ok(None) };
+            let work = AssertUnwindSafe(|| pool.explain(declared, &progress));
+            let explained = match catch_unwind(work) {
+                Ok(explained) => explained,
+                Err(cause) if cause.is::<Stopped>() => return Err(Stopped),
+                Err(cause) => resume_unwind(cause),
+            };
+            let unusable = match explained {
+                Ok(explanation) => return Ok(Some((pool, explanation))),
+                Err(unusable) => unusable,
+            };
+            let Some(run) = pool.runs.iter().find(|run| run.name == unusable.name) else {
+                return Ok(None);
+            };
+            report_unusable(&mut self.memory, &run.key(), &unusable.problem);
         }
     }
 }

@@ -1,9 +1,8 @@
-//! Runs that are explained together, within bounds of memory and time: a dataset with the train and line of the model
-//! in force.
+//! Runs that are explained together, within bounds of memory: a dataset with the train and line of the model in force.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use dynocar::dataset::LoadError;
@@ -13,6 +12,10 @@ use dynocar_analysis::dataset::written::name_model;
 use dynocar_analysis::dataset::{
     Dataset, DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE, Manifest, Role, Run, RunContent,
 };
+use dynocar_analysis::explain::evidence::RunDataError;
+use dynocar_analysis::explain::many::{Held, Many};
+use dynocar_analysis::explain::selection::Progress;
+use dynocar_analysis::explain::{Explanation, explain, explain_many};
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use toml::Table;
@@ -24,11 +27,11 @@ use crate::dataset::FilesOfDataset;
 /// Bounds of the runs that are explained together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
-    /// Greatest number of runs.
+    /// Greatest number of runs, before all of them are taken.
     pub runs: usize,
-    /// Greatest total time of the runs.
+    /// Greatest total time of these runs.
     pub time: Duration,
-    /// Greatest number of their samples, which bounds the memory.
+    /// Greatest number of samples in memory.
     pub samples: usize,
     /// Age, counted from the newest run, below which runs are first explained by themselves.
     pub recent: Duration,
@@ -55,14 +58,33 @@ const HELD_OUT_SHARE: f64 = 0.2;
 /// Runs that are explained together.
 #[derive(Debug)]
 pub struct Pool {
-    /// The runs as one dataset.
+    /// The runs as one dataset; where they are many, without their samples.
     pub dataset: Dataset,
     /// Where they lie, in the same order.
     pub runs: Vec<FoundRun>,
+    /// Which of many runs the search uses.
+    held: Option<Held>,
+}
+
+/// A run that cannot be used.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UnusableRun {
+    /// Its name.
+    pub name: String,
+    /// Why.
+    pub problem: String,
+}
+
+impl From<RunDataError> for UnusableRun {
+    fn from(error: RunDataError) -> Self {
+        let problem = error.to_string();
+        let RunDataError::Simulate { file: name, .. } = error;
+        UnusableRun { name, problem }
+    }
 }
 
 /// Returns the choices of runs that are explained, one after the other until one shows an effect: the recent ones, in
-/// which something new shows undiluted, then these with a sample of all before.
+/// which something new shows undiluted, then these with a sample of all before, then all.
 pub fn choices(runs: &[FoundRun], bounds: &Bounds) -> Vec<Vec<FoundRun>> {
     let Some(newest) = runs.last() else { return Vec::new() };
     let since_s = newest.recorded.unix_s.saturating_sub(bounds.recent.as_secs());
@@ -78,6 +100,9 @@ pub fn choices(runs: &[FoundRun], bounds: &Bounds) -> Vec<Vec<FoundRun>> {
         mixed.extend_from_slice(&recent[recent.len() - own..]);
         choices.push(mixed);
     }
+    if runs.len() > bounds.runs {
+        choices.push(runs.to_vec());
+    }
     choices
 }
 
@@ -87,62 +112,112 @@ fn spread(length: usize, most: usize) -> BTreeSet<usize> {
     (0..count).map(|k| (2 * k + 1) * length / (2 * count)).collect()
 }
 
-/// A declared model, as text and as read.
+/// A declared model, as text and as read, and the dataset that was read last under it.
 pub struct Declared<'d> {
-    /// Its files.
-    pub text: &'d ModelText,
-    /// The train.
-    pub train: &'d Arc<TrainModel>,
-    /// The line, where one is declared.
-    pub track: Option<&'d Arc<Track>>,
+    text: &'d ModelText,
+    train: Arc<TrainModel>,
+    track: Option<Arc<Track>>,
+    opened: Mutex<Option<Arc<OpenedDataset<'d>>>>,
 }
 
-/// Reads runs under a model, the newest first until the bounds are reached; unreadable runs are reported once and left
-/// out. `None` where fewer than two are left: one to fit, one to judge.
+impl<'d> Declared<'d> {
+    /// Of a train and, where one is declared, its line.
+    pub fn new(text: &'d ModelText, (train, track): (TrainModel, Option<Track>)) -> Self {
+        let (train, track) = (Arc::new(train), track.map(Arc::new));
+        Declared { text, train, track, opened: Mutex::new(None) }
+    }
+
+    /// Reads a run.
+    fn read(&self, found: &FoundRun) -> Result<Run, UnusableRun> {
+        let unusable = |problem| UnusableRun { name: found.name.clone(), problem };
+        let dataset = self.dataset_of(found).map_err(|error| unusable(error.to_string()))?;
+        let OpenedDataset { files, head, .. } = &*dataset;
+        // The description may have changed since the runs were found.
+        if found.index >= head.manifest.runs.len() {
+            return Err(unusable(format!("{}: no longer described", found.name)));
+        }
+        let run = head.read_run(files, found.index);
+        run.map_err(|error| unusable(error.to_string()))
+    }
+
+    fn dataset_of(&self, found: &FoundRun) -> Result<Arc<OpenedDataset<'d>>, LoadError> {
+        let mut opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = opened.as_ref().filter(|it| it.folder == found.dataset) {
+            return Ok(Arc::clone(known));
+        }
+        let files = Overlay::at(&found.dataset, self.text)?;
+        let head = DatasetHead::open(&files)?;
+        let folder = found.dataset.clone();
+        Ok(Arc::clone(opened.insert(Arc::new(OpenedDataset { folder, files, head }))))
+    }
+
+    fn dataset(&self, runs: Vec<Run>) -> Dataset {
+        Dataset {
+            name: format!("train {}", self.train.name),
+            description: None,
+            train: Arc::clone(&self.train),
+            track: self.track.clone(),
+            runs,
+        }
+    }
+}
+
+/// Reads runs under a model; unreadable runs are reported once and left out. Few runs are read from the newest until
+/// the bounds are reached. `None` where fewer than two are left, one to fit and one to judge, and where those that the
+/// search of many uses exceed the memory.
 pub fn read(
     chosen: &[FoundRun],
-    declared: Declared<'_>,
+    declared: &Declared,
     bounds: &Bounds,
     memory: &mut LearnerMemory,
 ) -> Option<Pool> {
-    let Declared { text, train, track } = declared;
+    let is_few = chosen.len() <= bounds.runs;
     let mut kept: Vec<(FoundRun, Run)> = Vec::new();
-    let (mut time_s, mut samples) = (0.0, 0);
-    let mut opened = None;
+    let (mut time_s, mut samples) = (0.0, Vec::new());
     for found in chosen.iter().rev() {
         if memory.unusable.contains_key(&found.key()) {
             continue;
         }
-        let run = match read_run(found, text, &mut opened) {
+        let mut run = match declared.read(found) {
             Ok(run) => run,
-            Err(problem) => {
-                report_unusable(memory, &found.key(), &problem);
+            Err(unusable) => {
+                report_unusable(memory, &found.key(), &unusable.problem);
                 continue;
             }
         };
         time_s += duration_s(&run);
-        samples += run.samples.len();
-        let is_within = time_s <= bounds.time.as_secs_f64() && samples <= bounds.samples;
-        if !is_within && kept.len() > 1 {
+        samples.push(run.samples.len());
+        let is_within =
+            time_s <= bounds.time.as_secs_f64() && samples.iter().sum::<usize>() <= bounds.samples;
+        if is_few && !is_within && kept.len() > 1 {
             break;
+        }
+        if !is_few {
+            run.split_off_samples();
         }
         kept.push((found.clone(), run));
     }
     kept.reverse();
-    let (found, runs) = kept.into_iter().unzip();
-    let dataset = Dataset {
-        name: format!("train {}", train.name),
-        description: None,
-        train: Arc::clone(train),
-        track: track.map(Arc::clone),
-        runs,
+    samples.reverse();
+    let (runs, known): (Vec<FoundRun>, Vec<Run>) = kept.into_iter().unzip();
+    if !is_few && runs.len() <= bounds.runs {
+        return read(&runs, declared, bounds, memory);
+    }
+    let mut pool = Pool { dataset: declared.dataset(known), runs, held: None };
+    pool.number()?;
+    let Some(held) = Held::of(pool.dataset.runs.iter().map(|run| run.role)).filter(|_| !is_few)
+    else {
+        return Some(pool);
     };
-    Pool { dataset, runs: found }.in_order()
+    let of_held = samples.iter().enumerate().filter(|(index, _)| held.holds(*index));
+    let in_memory: usize = of_held.map(|it| it.1).sum();
+    pool.held = Some(held);
+    (in_memory <= bounds.samples).then_some(pool)
 }
 
 impl Pool {
-    /// Returns the pool with its runs numbered, the last ones held out; `None` where fewer than two are left.
-    pub fn in_order(mut self) -> Option<Self> {
+    /// Numbers the runs, the last ones held out; `None` where fewer than two are left.
+    fn number(&mut self) -> Option<()> {
         let count = self.runs.len();
         if count < 2 {
             return None;
@@ -154,15 +229,31 @@ impl Pool {
             run.number = index as u32 + 1;
             run.samples.iter_mut().for_each(|sample| sample.run = run.number);
         }
-        Some(self)
+        Some(())
     }
 
-    /// Returns the pool without a run; `None` where too few are left.
-    pub fn without(mut self, name: &str) -> Option<Self> {
-        let index = self.runs.iter().position(|run| run.name == name)?;
-        self.runs.remove(index);
-        self.dataset.runs.remove(index);
-        self.in_order()
+    /// Explains the runs; many are read again, one after the other.
+    ///
+    /// # Errors
+    ///
+    /// The first run that cannot be used.
+    pub fn explain(
+        &self,
+        declared: &Declared,
+        progress: Progress,
+    ) -> Result<Explanation, UnusableRun> {
+        let Some(held) = &self.held else { return Ok(explain(&self.dataset, progress)?) };
+        let read = |index: usize| {
+            let mut run = declared.read(&self.runs[index])?;
+            let known = &self.dataset.runs[index];
+            run.file.clone_from(&known.file);
+            (run.role, run.number) = (known.role, known.number);
+            run.samples.iter_mut().for_each(|sample| sample.run = known.number);
+            Ok::<_, UnusableRun>(run)
+        };
+        let chosen = (0..self.runs.len()).filter(|index| held.holds(*index)).map(read);
+        let chosen = declared.dataset(chosen.collect::<Result<_, _>>()?);
+        explain_many(chosen, Many { dataset: &self.dataset, held, read: &read }, progress)
     }
 }
 
@@ -171,25 +262,6 @@ struct OpenedDataset<'m> {
     folder: PathBuf,
     files: Overlay<'m>,
     head: DatasetHead,
-}
-
-fn read_run<'m>(
-    found: &FoundRun,
-    text: &'m ModelText,
-    opened: &mut Option<OpenedDataset<'m>>,
-) -> Result<Run, String> {
-    if opened.as_ref().is_none_or(|it| it.folder != found.dataset) {
-        let files = Overlay::at(&found.dataset, text).map_err(|error| error.to_string())?;
-        let head = DatasetHead::open(&files).map_err(|error| error.to_string())?;
-        *opened = Some(OpenedDataset { folder: found.dataset.clone(), files, head });
-    }
-    match opened {
-        // The description may have changed since the runs were found.
-        Some(OpenedDataset { files, head, .. }) if found.index < head.manifest.runs.len() => {
-            head.read_run(files, found.index).map_err(|error| error.to_string())
-        }
-        _ => Err(format!("{}: no longer described", found.name)),
-    }
 }
 
 fn duration_s(run: &Run) -> f64 {
@@ -264,18 +336,19 @@ mod tests {
     }
 
     #[test]
-    fn the_recent_runs_come_alone_first_and_then_with_a_sample_of_all_before() {
+    fn the_recent_runs_come_alone_then_with_a_sample_of_all_before_and_then_all() {
         let runs: Vec<FoundRun> =
             (0..28).flat_map(|day| (0..4).map(move |k| run(day, k))).collect();
         let bounds = Bounds { runs: 20, ..Bounds::default() };
         let choices = choices(&runs, &bounds);
-        assert_eq!(choices.len(), 2);
+        assert_eq!(choices.len(), 3);
         assert_eq!(choices[0].len(), 9, "those of 2 days, to the second");
         assert_eq!(choices[1].len(), 20);
         let days: BTreeSet<&str> =
             choices[1].iter().map(|run| run.name.split('/').next().unwrap()).collect();
         assert!(days.len() >= 12, "over the weeks: {days:?}");
         assert!(choices[1].windows(2).all(|pair| pair[0].recorded <= pair[1].recorded));
+        assert_eq!(choices[2].len(), 28 * 4);
         assert_eq!(super::choices(&runs[100..], &bounds).len(), 1 + 1);
         assert_eq!(super::choices(&runs[106..], &bounds).len(), 1, "no older ones");
         assert!(super::choices(&[], &bounds).is_empty());

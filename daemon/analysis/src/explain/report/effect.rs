@@ -110,9 +110,20 @@ pub fn small(outcome: &SearchOutcome, trial: &EffectTrial) -> String {
     let effect = &trial.fit.model.effects[trial.last()];
     let tried = trial.fit.effect_parameters(trial.last());
     let values = outcome.values(trial.kind).unwrap_or(tried);
-    let each = effect.parameters().iter().zip(values).map(|(spec, value)| {
-        let (words, unit) = words::parameter(spec.name);
-        format!("{words} {value:.4} {unit}").trim_end().to_owned()
+    let mut by_name: Vec<(&str, Vec<f64>)> = Vec::new();
+    for (spec, value) in effect.parameters().iter().zip(values) {
+        match by_name.iter_mut().find(|(name, _)| *name == spec.name) {
+            Some((_, values)) => values.push(*value),
+            None => by_name.push((spec.name, vec![*value])),
+        }
+    }
+    let each = by_name.iter().map(|(name, values)| {
+        let (words, unit) = words::parameter(name);
+        let value = match span(values.iter().copied()) {
+            Some([least, greatest]) if least < greatest => format!("{least:.4} to {greatest:.4}"),
+            _ => format!("{:.4}", values[0]),
+        };
+        format!("{words} {value} {unit}").trim_end().to_owned()
     });
     format!("{} ({})", kind_name(trial.kind.name()), each.collect::<Vec<_>>().join(", "))
 }

@@ -140,12 +140,14 @@ impl Search<'_> {
         let may_stand = |trial: &&EffectTrial| may_be(trial) && !is_left(trial);
         let may_be_certain = tried.iter().filter(may_stand);
         let judged = may_be_certain.map(|trial| self.with_map_free(joint, trial));
-        let certain = judged.filter(|trial| is_certain_with_nuisance(trial, trial.evidence));
-        let best = certain.max_by(|one, other| one.evidence.total_cmp(&other.evidence));
+        let certain: Vec<EffectTrial> =
+            judged.filter(|trial| is_certain_with_nuisance(trial, trial.evidence)).collect();
+        let best = certain.iter().max_by(|one, other| one.evidence.total_cmp(&other.evidence));
         let Some(found) = best else { return false };
+        let kind = found.kind;
         let grown = self.problem.grown(&outcome.fit, [found.last_parts()]);
         outcome.fit = self.problem.with_own_noise(&grown);
-        outcome.certain.push((found.kind, round_of(tried)));
+        outcome.certain.push((kind, round_of(certain)));
         true
     }
 

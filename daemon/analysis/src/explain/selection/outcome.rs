@@ -42,7 +42,7 @@ impl EffectTrial {
     }
 
     /// The candidate and its parameters.
-    pub(super) fn last_parts(&self) -> (SharedHypothesis, Vec<f64>) {
+    pub fn last_parts(&self) -> (SharedHypothesis, Vec<f64>) {
         let last = self.last();
         (self.fit.model.effects[last].clone(), self.fit.effect_parameters(last).to_vec())
     }
@@ -120,7 +120,7 @@ pub struct SearchOutcome {
     pub not_testable: Vec<(EffectKind, String)>,
     /// Kinds that are certain and small: part of the model, and not named.
     pub small: Vec<EffectKind>,
-    /// Kinds that are certain jointly with the usual errors, with the trials of the round that found them.
+    /// Kinds that are certain jointly with the usual errors, with all trials that were certain when they were found.
     pub certain: Vec<(EffectKind, SearchRound)>,
     /// Kinds that were found and did not stand jointly with the usual errors, and why; they are not looked for again.
     pub fallen: Vec<(EffectKind, Refusal)>,
