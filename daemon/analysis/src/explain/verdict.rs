@@ -335,8 +335,7 @@ fn worded(
             (String::new(), experiment)
         }
     };
-    let rivals = kinds_of(competing);
-    (verdict_words(verdict, effects, &rivals, more + &undetermined), experiment)
+    (verdict_words(verdict, effects, competing, more + &undetermined), experiment)
 }
 
 /// Describes a residual that nothing in the model stands for.

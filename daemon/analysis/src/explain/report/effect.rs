@@ -13,6 +13,7 @@ use crate::explain::answer::{
     EffectAnswer, EffectMeaning, HeldOutAnswer, Location, MassWindow, ParameterValue,
     PlaceUncertainty, RunWindow, Verdict, VerdictWords, WithStd, in_plain_words,
 };
+use crate::explain::competing::{CompetingHypotheses, kinds_of};
 use crate::explain::over_time::CHANCE_MAX;
 use crate::explain::selection::{EffectTrial, ScaleSources, SearchOutcome};
 use crate::statistics::span;
@@ -261,22 +262,33 @@ fn precision(known: &PlaceUncertainty) -> Option<String> {
     (!shown.is_empty()).then(|| format!("ends known to ± {} or better", shown.join(", ± ")))
 }
 
-/// Returns a verdict with its effects, the kinds that explain the runs as well, and the questions that it leaves open.
+/// Returns a verdict with its effects, the kinds that explain the runs as well as some of them, and the questions that
+/// it leaves open.
 pub fn verdict_words(
     verdict: Verdict,
     effects: &[EffectAnswer],
-    rivals: &[&'static str],
+    competing: &[CompetingHypotheses],
     left: String,
 ) -> VerdictWords {
-    let found: Vec<String> = effects.iter().map(described).collect();
-    let found = found.join("; and ");
+    let is_contested = |it: &&EffectAnswer| competing.iter().any(|c| c.accepted.name() == it.kind);
+    let (contested, sure): (Vec<&EffectAnswer>, Vec<_>) = effects.iter().partition(is_contested);
+    let listed = |effects: &[&EffectAnswer]| {
+        effects.iter().map(|it| described(it)).collect::<Vec<_>>().join("; and ")
+    };
+    let found = listed(&effects.iter().collect::<Vec<_>>());
     let has_form = effects.iter().any(|it| it.kind == EffectKind::Unknown.name());
-    let heading = match (verdict, effects.len()) {
-        (Verdict::Effect, 1) => "Found: the declared model lacks one effect".into(),
-        (Verdict::Effect, count) => format!("Found: the declared model lacks {count} effects"),
-        (Verdict::Ambiguous, _) => {
-            "Something undeclared acts, but these runs do not show what".into()
-        }
+    let lacking = |count: usize| match count {
+        1 => "Found: the declared model lacks one effect".to_owned(),
+        count => format!("Found: the declared model lacks {count} effects"),
+    };
+    let open = match sure.is_empty() {
+        true => "Something undeclared acts, but these runs do not show what",
+        false => "Something else undeclared acts, but these runs do not show what",
+    };
+    let heading = match (verdict, sure.len()) {
+        (Verdict::Effect, count) => lacking(count),
+        (Verdict::Ambiguous, 0) => open.into(),
+        (Verdict::Ambiguous, count) => format!("{}. {open}", lacking(count)),
         (Verdict::Unknown, _) => {
             "Something undeclared acts that no effect of the library explains".into()
         }
@@ -289,9 +301,13 @@ pub fn verdict_words(
     let whole = match verdict {
         Verdict::Effect => format!("Found: {found}"),
         Verdict::Ambiguous => {
-            let names: Vec<String> = rivals.iter().map(|it| kind_name(it).into()).collect();
-            let explain = if names.len() == 1 { "explains" } else { "explain" };
-            format!("{heading}: it may be {found}; {} {explain} them as well", joined(&names))
+            let found =
+                if sure.is_empty() { String::new() } else { format!("Found: {}. ", listed(&sure)) };
+            let rivals = kinds_of(competing).into_iter().map(|it| kind_name(it).to_owned());
+            let rivals: Vec<String> = rivals.collect();
+            let explain = if rivals.len() == 1 { "explains" } else { "explain" };
+            let (contested, rivals) = (listed(&contested), joined(&rivals));
+            format!("{found}{open}: it may be {contested}; {rivals} {explain} them as well")
         }
         Verdict::Unknown if has_form => format!("{heading}: {found}"),
         Verdict::Unknown if !found.is_empty() => format!("{heading}, beside {found}"),

@@ -150,6 +150,7 @@ mod tests {
     use crate::explain::answer::{
         BaseAnswer, DavisDeviations, EffectAnswer, EffectMeaning, Location, ParameterValue,
     };
+    use crate::explain::competing::CompetingHypotheses;
     use crate::explain::report::IntervalEstimate;
     use crate::explain::report::effect::verdict_words;
     use crate::explain::report::errors::{ErrorPair, Resampling};
@@ -226,8 +227,12 @@ mod tests {
     #[test]
     fn rivals_and_unknown_causes_are_distinguished_from_findings() {
         let errors = updated_errors();
-        let said = |verdict: Verdict, effects: Vec<EffectAnswer>, rivals: &[&'static str]| {
-            let words = verdict_words(verdict, &effects, rivals, String::new());
+        let said = |verdict: Verdict, effects: Vec<EffectAnswer>, rivals: &[EffectKind]| {
+            let accepted = EffectKind::LocalResistance;
+            let competing =
+                rivals.iter().map(|it| CompetingHypotheses { accepted, kinds: vec![*it] });
+            let competing: Vec<CompetingHypotheses> = competing.collect();
+            let words = verdict_words(verdict, &effects, &competing, String::new());
             sentence(&ExplainAnswer { verdict, effects, words, ..ambiguous() }, &errors)
         };
         let size = "from km 5.20 to 6.90 – extra resistance 2.50 N/kN (95 % interval 2.30 to 2.70)";
@@ -235,10 +240,21 @@ mod tests {
                       fall (from 0.800 to 0.900 m/s).";
         let place = effect("local_resistance", "extra_n_per_kn");
         assert_eq!(
-            said(Verdict::Ambiguous, vec![place.clone()], &["tunnel_drag"]),
+            said(Verdict::Ambiguous, vec![place.clone()], &[EffectKind::TunnelDrag]),
             format!(
                 "Something undeclared acts, but these runs do not show what: it may be a local \
                  resistance {size}; tunnel drag explains them as well. {gained}"
+            )
+        );
+        let gain = effect("traction_gain", "gain");
+        let both = said(Verdict::Ambiguous, vec![gain, place.clone()], &[EffectKind::TunnelDrag]);
+        assert_eq!(
+            both.split(" With them").next().unwrap(),
+            format!(
+                "Found: a wrong scale of the reported traction force from km 5.20 to 6.90 – \
+                 reported over true force 2.50 (95 % interval 2.30 to 2.70). Something else \
+                 undeclared acts, but these runs do not show what: it may be a local resistance \
+                 {size}; tunnel drag explains them as well."
             )
         );
         let form = effect("unknown", "extra_n_per_kn");
