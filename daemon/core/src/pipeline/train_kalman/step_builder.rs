@@ -69,6 +69,9 @@ pub struct StepBuilder {
     is_stopping: bool,
     /// True from a standstill until the brake that held the train is released.
     was_held: bool,
+    /// Brake-cylinder pressure in Pa of the newest sample, and the share that it is of the pressure before, 1 at most.
+    pressure_pa: Option<f64>,
+    pressure_left: f64,
     /// Direction between an error of the brake's scale and one of its time, of the newest step: one says nothing of the
     /// other.
     brake_angle: f64,
@@ -97,12 +100,23 @@ impl StepBuilder {
             is_braking: false,
             is_stopping: false,
             was_held: false,
+            pressure_pa: None,
+            pressure_left: 1.0,
             brake_angle: 0.0,
             renewals: 0.0,
             wind_s: 0.0,
             seen: None,
             unseen_m: f64::INFINITY,
         }
+    }
+
+    /// Takes in the brake-cylinder pressure in Pa, before the forces of the same sample.
+    pub fn see_pressure(&mut self, pressure_pa: Option<f64>) {
+        let before_pa = std::mem::replace(&mut self.pressure_pa, pressure_pa);
+        self.pressure_left = match before_pa.zip(pressure_pa) {
+            Some((before_pa, now_pa)) if before_pa > 0.0 => (now_pa / before_pa).clamp(0.0, 1.0),
+            _ => 1.0,
+        };
     }
 
     /// Takes in the reported forces, also at a standstill.
@@ -114,9 +128,11 @@ impl StepBuilder {
         // Nobody knows where a train was between two segments.
         let is_followed = segment == now.segment;
         self.unseen_m += if is_followed { since_s * now.speed_mps } else { f64::INFINITY };
-        let left = (-since_s / self.settings.brake_lag_s).exp();
         let is_held = now.speed_mps < self.settings.speed_min_mps;
         self.was_held |= is_held;
+        let lagging = (-since_s / self.settings.brake_lag_s).exp();
+        // A standing train is held by friction, whose force is in proportion to the pressure.
+        let left = if self.was_held { lagging.min(self.pressure_left) } else { lagging };
         self.is_braking |= now.brake > RELEASED;
         self.is_braking &= now.traction <= RELEASED;
         self.is_stopping = self.is_braking && now.speed_mps < FRICTION_MPS && !is_held;
@@ -267,12 +283,17 @@ mod tests {
         }
     }
 
+    /// Returns the step between two samples of a train with usual settings and Davis 1.5, 0.02 and 0.001.
+    fn step(steps: &mut StepBuilder, from: &UnitSample, to: &UnitSample) -> FilterStep {
+        let resistance = ResistanceBelief::declared(&Davis { a: 1.5, b: 0.02, c: 0.001 }, 0.4);
+        let learned = LearnedState::new(&TrainKalmanSettings::default(), &resistance);
+        steps.to((from, to), &ResolvedSample::coasting(), (0.0, &learned), &resistance)
+    }
+
     /// Variance of the impulse over 400 m by where on the line a gradient changes by 6 ‰ under a train of 100 m, which
     /// passes it at a speed.
     fn place_variance(rate_hz: i64, position_noise_m: f64, speed_mps: f64) -> f64 {
         let settings = TrainKalmanSettings { wind_std_mps: 0.0, ..Default::default() };
-        let resistance = ResistanceBelief::declared(&Davis { a: 1.5, b: 0.02, c: 0.001 }, 0.4);
-        let learned = LearnedState::new(&settings, &resistance);
         let mut steps = StepBuilder::new(&settings, 100.0);
         let sample = |k: i64| {
             let time_s = k as f64 / rate_hz as f64;
@@ -284,9 +305,7 @@ mod tests {
         let of_step = |k: i64| {
             let (from, to) = (sample(k - 1), sample(k));
             steps.see(&to);
-            steps
-                .to((&from, &to), &ResolvedSample::coasting(), (0.0, &learned), &resistance)
-                .impulse_variance
+            step(&mut steps, &from, &to).impulse_variance
         };
         (1..(400.0 / speed_mps) as i64 * rate_hz).map(of_step).sum()
     }
@@ -330,16 +349,13 @@ mod tests {
 
     #[test]
     fn a_brake_whose_report_fades_before_the_stop_may_act_until_the_train_is_driven() {
-        let resistance = ResistanceBelief::declared(&Davis { a: 1.5, b: 0.02, c: 0.001 }, 0.4);
-        let learned = LearnedState::new(&TrainKalmanSettings::default(), &resistance);
         // The standard deviation of the brake force 10 s after the end of its report.
         let std = |speed_mps: f64, traction: f64| {
             let mut steps = StepBuilder::new(&TrainKalmanSettings::default(), 100.0);
             steps.see(&UnitSample { brake: 30.0, ..coasting(0, speed_mps) });
             let after = |k: i64| UnitSample { traction, ..coasting(k * SECOND_NS / 10, speed_mps) };
             (1..=100).for_each(|k| steps.see(&after(k)));
-            let at = (&after(99), &after(100));
-            let step = steps.to(at, &ResolvedSample::coasting(), (0.0, &learned), &resistance);
+            let step = step(&mut steps, &after(99), &after(100));
             step.brake_std / step.duration_s
         };
         assert!((std(3.0, 0.0) - 30.0).abs() < 1e-9);
@@ -347,22 +363,38 @@ mod tests {
     }
 
     #[test]
+    fn a_starting_train_is_held_no_longer_than_there_is_pressure_in_its_cylinders() {
+        // The standard deviation of the brake force 1 s after the end of its report, by the pressure after a time in s.
+        let std = |pressure_pa: fn(f64) -> Option<f64>| {
+            let mut steps = StepBuilder::new(&TrainKalmanSettings::default(), 100.0);
+            steps.see_pressure(pressure_pa(0.0));
+            steps.see(&UnitSample { brake: 30.0, ..coasting(0, 0.0) });
+            let after = |k: i64| UnitSample { traction: 5.0, ..coasting(k * SECOND_NS / 10, 1.0) };
+            for k in 1..=10 {
+                steps.see_pressure(pressure_pa(0.1 * k as f64));
+                steps.see(&after(k));
+            }
+            let step = step(&mut steps, &after(9), &after(10));
+            step.brake_std / step.duration_s
+        };
+        let by_lag = 30.0 * (-1.0_f64 / 1.5).exp();
+        assert!((std(|_| None) - by_lag).abs() < 1e-9);
+        assert!((std(|_| Some(2e5)) - by_lag).abs() < 1e-9, "a sensor that does not follow");
+        let by_pressure = 30.0 * (-1.0_f64 / 0.3).exp();
+        assert!((std(|time_s| Some(2e5 * (-time_s / 0.3).exp())) - by_pressure).abs() < 1e-9);
+        assert_eq!(std(|time_s| Some(if time_s < 0.5 { 2e5 } else { 0.0 })), 0.0);
+    }
+
+    #[test]
     fn a_change_of_gradient_is_as_uncertain_at_any_rate_and_speed_and_with_noise_of_the_position() {
-        let cases = [
-            (5, 0.0, 20.0),
-            (10, 0.0, 20.0),
-            (50, 0.0, 20.0),
-            (10, 1.0, 20.0),
-            (50, 1.0, 20.0),
-            (10, 1.0, 1.0),
-            (50, 1.0, 0.5),
-        ];
-        for (rate_hz, noise_m, speed_mps) in cases {
-            // 3 m, 6 ‰; the average over a second or 10 m takes off some of it.
-            let whole = (3.0 / speed_mps * 6.0_f64).powi(2);
-            let share = place_variance(rate_hz, noise_m, speed_mps) / whole;
-            let case = format!("{rate_hz} Hz, {noise_m} m, {speed_mps} m/s: {share}");
-            assert!((0.7..1.1).contains(&share), "{case}");
+        for (rate_hz, noise_m) in [(5, 0.0), (10, 0.0), (50, 0.0), (10, 1.0), (50, 1.0)] {
+            for speed_mps in [20.0, 1.0] {
+                // 3 m, 6 ‰; the average over a second or 10 m takes off some of it.
+                let whole = (3.0 / speed_mps * 6.0_f64).powi(2);
+                let share = place_variance(rate_hz, noise_m, speed_mps) / whole;
+                let case = format!("{rate_hz} Hz, {noise_m} m, {speed_mps} m/s: {share}");
+                assert!((0.7..1.1).contains(&share), "{case}");
+            }
         }
     }
 }
