@@ -68,9 +68,10 @@ pub struct QuantityScore {
     was_usable: bool,
     /// Cycles after the first two minutes, and those with a usable answer.
     pub later: [u64; 2],
-    /// Motion in s after each stop until the answer was known, and of the newest so far.
+    /// Motion in s after each stop until the answer was known again, and of the newest so far.
     known_s: Vec<f64>,
     moving_s: Option<f64>,
+    was_known: bool,
 }
 
 impl QuantityScore {
@@ -100,14 +101,17 @@ impl QuantityScore {
         self.wrong_s = self.wrong_s.max(self.wrong_now_s);
     }
 
-    /// Takes in whether the train stands: how long it moves after a stop until the answer is known.
+    /// Takes in whether the train stands: how long it moves after a stop until an answer that was known once is known
+    /// again.
     pub fn follow_stops(&mut self, is_standing: bool, cycle_s: f64, answer: Option<Answer>) {
+        let is_known = answer.is_some_and(|it| it.deviation < KNOWN);
+        self.was_known |= is_known;
         if is_standing {
-            let before_s = self.moving_s.replace(0.0);
+            let before_s = std::mem::replace(&mut self.moving_s, self.was_known.then_some(0.0));
             self.known_s.extend(before_s.filter(|moving_s| *moving_s > 0.0));
         } else if let Some(moving_s) = &mut self.moving_s {
             *moving_s += cycle_s;
-            if answer.is_some_and(|it| it.deviation < KNOWN) {
+            if is_known {
                 self.known_s.push(*moving_s);
                 self.moving_s = None;
             }
@@ -161,7 +165,7 @@ impl Scores<'_> {
         100.0 * usable as f64 / cycles.max(1) as f64
     }
 
-    /// Returns the time of motion in s after a stop until the answer was known, for 19 stops of 20.
+    /// Returns the time of motion in s after a stop until the answer was known again, for 19 stops of 20.
     pub fn known_again_s(&self) -> Option<f64> {
         let mut all: Vec<f64> = self.0.iter().flat_map(|it| it.known_s.iter().copied()).collect();
         all.sort_by(f64::total_cmp);
@@ -171,5 +175,24 @@ impl Scores<'_> {
     /// Returns the median time in s until the first use.
     pub fn first_use_s(&self) -> Option<f64> {
         median(self.0.iter().map(|it| it.first_s.unwrap_or(f64::INFINITY)).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn motion_counts_until_an_answer_is_known_again_but_not_until_it_is_known_first() {
+        let mut score = QuantityScore::default();
+        for cycle in 0..60 {
+            // Stops of 5 s, each followed by 15 s of motion, and known 8 s after the first start, 3 s after others.
+            let (second, stop) = (cycle % 20, cycle / 20);
+            let is_known = second >= if stop == 0 { 13 } else { 8 };
+            let std = if is_known { 0.01 } else { 0.1 };
+            let answer = Answer::of(Uncertain::new(1.0, std), 1.0, 1.0);
+            score.follow_stops(second < 5, 1.0, Some(answer));
+        }
+        assert_eq!(score.known_s, [4.0, 4.0]);
     }
 }

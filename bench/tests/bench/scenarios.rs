@@ -70,6 +70,27 @@ fn a_strong_wind_on_a_train_of_more_air_resistance_than_declared_stays_in_the_in
     }
 }
 
+#[test]
+fn a_changed_load_is_known_sooner_where_the_cylinder_pressure_is_reported() {
+    let mut rows = table::brakes();
+    let names = ["friction, late and weak, map 0.1 ‰", "with pressure, map 0.1 ‰"];
+    rows.retain(|(own, _)| own[0] == "tram" && names.contains(&own[1].as_str()));
+    let lines = table::run(&Plan {
+        scenarios: &rows,
+        kinds: &[PipelineKind::TrainKalman],
+        seeds: 2,
+        first_seed: 501,
+        hours: 0.5,
+        mistakes: Mistakes::USUAL,
+        threads: 2,
+    })
+    .unwrap();
+    // The drives are the same; the second and the fourth line are those of the mass.
+    let of = |line: usize, name: &str| lines[line].value(name).expect(name);
+    assert!(of(3, "known_again_s") < 0.8 * of(1, "known_again_s"), "{lines:?}");
+    assert!((0..4).all(|it| of(it, "longest_wrong_s") <= 1.0), "{lines:?}");
+}
+
 /// Every snapshot of the recommended pipelines over an hour of a healthy train.
 fn each_snapshot(mut look: impl FnMut(f64, &ParameterSnapshot)) {
     let mut scenario = named(&["EMU, load exact"])[0].1;

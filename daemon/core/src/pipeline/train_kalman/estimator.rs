@@ -273,6 +273,7 @@ impl Estimator for TrainKalman {
     fn update(&mut self, sample: &ResolvedSample) -> Outcome {
         let unit = UnitSample::from_sample(sample);
         if let Ok(unit) = unit {
+            self.steps.see_pressure(sample.brake_cylinder_pressure_pa);
             self.steps.see(&unit);
         }
         if !self.is_under_way(sample) {

@@ -12,9 +12,10 @@ use crate::pipeline::momentum::UnitSample;
 
 /// How long a change of force is remembered, in s.
 const FORCE_RATE_MEMORY_S: f64 = 0.5;
-/// Time in s over which the change of the known retarding forces is averaged: positions with noise let the gradient
-/// jump to and fro, the more often the more samples there are.
-const KNOWN_RATE_MEMORY_S: f64 = 1.0;
+/// Time in s, and distance in m, over which the slope of the known retarding forces is averaged: positions with noise let
+/// the gradient jump to and fro, the more often the more samples there are, and the further the slower the train is.
+const KNOWN_SLOPE_MEMORY_S: f64 = 1.0;
+const KNOWN_SLOPE_MEMORY_M: f64 = 10.0;
 
 /// Change of speed in m/s, and time in s, over which the difference between brake force and report becomes another one:
 /// friction depends on speed, is blended by speed, and heats up in a long descent.
@@ -58,8 +59,8 @@ pub struct StepBuilder {
     acting: ForceHistory,
     /// Fastest change of the reported force lately in N/kN per s.
     force_rate: f64,
-    /// Change of the known retarding forces in N/kN per s.
-    known_rate: f64,
+    /// Change of the known retarding forces in N/kN per m.
+    known_slope: f64,
     /// Brake force in N/kN of a brake as slow as may be, and the time in ns it refers to.
     followed: f64,
     /// True from a report of the brake until one of traction.
@@ -68,6 +69,9 @@ pub struct StepBuilder {
     is_stopping: bool,
     /// True from a standstill until the brake that held the train is released.
     was_held: bool,
+    /// Brake-cylinder pressure in Pa of the newest sample, and the share that it is of the pressure before, 1 at most.
+    pressure_pa: Option<f64>,
+    pressure_left: f64,
     /// Direction between an error of the brake's scale and one of its time, of the newest step: one says nothing of the
     /// other.
     brake_angle: f64,
@@ -91,17 +95,28 @@ impl StepBuilder {
             map_share: gradient_error_of_mean(train_length_m),
             acting,
             force_rate: 0.0,
-            known_rate: 0.0,
+            known_slope: 0.0,
             followed: 0.0,
             is_braking: false,
             is_stopping: false,
             was_held: false,
+            pressure_pa: None,
+            pressure_left: 1.0,
             brake_angle: 0.0,
             renewals: 0.0,
             wind_s: 0.0,
             seen: None,
             unseen_m: f64::INFINITY,
         }
+    }
+
+    /// Takes in the brake-cylinder pressure in Pa, before the forces of the same sample.
+    pub fn see_pressure(&mut self, pressure_pa: Option<f64>) {
+        let before_pa = std::mem::replace(&mut self.pressure_pa, pressure_pa);
+        self.pressure_left = match before_pa.zip(pressure_pa) {
+            Some((before_pa, now_pa)) if before_pa > 0.0 => (now_pa / before_pa).clamp(0.0, 1.0),
+            _ => 1.0,
+        };
     }
 
     /// Takes in the reported forces, also at a standstill.
@@ -113,9 +128,11 @@ impl StepBuilder {
         // Nobody knows where a train was between two segments.
         let is_followed = segment == now.segment;
         self.unseen_m += if is_followed { since_s * now.speed_mps } else { f64::INFINITY };
-        let left = (-since_s / self.settings.brake_lag_s).exp();
         let is_held = now.speed_mps < self.settings.speed_min_mps;
         self.was_held |= is_held;
+        let lagging = (-since_s / self.settings.brake_lag_s).exp();
+        // A standing train is held by friction, whose force is in proportion to the pressure.
+        let left = if self.was_held { lagging.min(self.pressure_left) } else { lagging };
         self.is_braking |= now.brake > RELEASED;
         self.is_braking &= now.traction <= RELEASED;
         self.is_stopping = self.is_braking && now.speed_mps < FRICTION_MPS && !is_held;
@@ -154,7 +171,7 @@ impl StepBuilder {
 
     /// Begins a motion, and returns the map's error since the one before.
     pub fn begin(&mut self, sample: &ResolvedSample) -> MapErrorStep {
-        (self.force_rate, self.known_rate) = (0.0, 0.0);
+        self.force_rate = 0.0;
         self.map_error(self.unseen_m, sample)
     }
 
@@ -193,19 +210,20 @@ impl StepBuilder {
         let faded = self.force_rate * (-duration_s / FORCE_RATE_MEMORY_S).exp();
         let change = to.traction - from.traction;
         self.force_rate = faded.max((change / duration_s).abs());
-        let share = (duration_s / KNOWN_RATE_MEMORY_S).min(1.0);
-        self.known_rate += share * ((to.known - from.known) / duration_s - self.known_rate);
+        let half_s = 0.5 * duration_s;
+        let travelled_m = half_s * (from.speed_mps + to.speed_mps);
+        let share = (duration_s / KNOWN_SLOPE_MEMORY_S).min(travelled_m / KNOWN_SLOPE_MEMORY_M);
+        let slope = (to.known - from.known) / travelled_m;
+        self.known_slope += share.min(1.0) * (slope - self.known_slope);
         // A change of gradient or curve passes under the train in many steps, all early or all late.
         let speed_mps = to.speed_mps.max(settings.speed_min_mps);
         let steps = (self.train_length_m / (speed_mps * duration_s)).max(1.0);
-        let place_s = settings.position_std_m / speed_mps;
-        let by_place = steps * (place_s * self.known_rate * duration_s).powi(2);
+        let by_place = steps * (settings.position_std_m * self.known_slope * duration_s).powi(2);
         // Over a time in which the speed's noise averages out gusts follow each other like noise.
         let by_wind = air.by_wind(to.speed_mps);
         let gust_n_per_kn = by_wind * wind::GUST_SHARE * settings.wind_std_mps;
         let by_gusts = 2.0 * wind::GUST_TIME_S * gust_n_per_kn.powi(2) * duration_s;
         let acting = self.acting.over(duration_s, delay_s);
-        let half_s = 0.5 * duration_s;
         let known = half_s * (from.known + to.known);
         // By the forces: the speed's noise changes it all the time.
         let changed_mps = (acting.impulses[0] - acting.impulses[1] - known).abs() / to.inertia;
@@ -217,7 +235,6 @@ impl StepBuilder {
         } else {
             wind_over(std::mem::take(&mut self.wind_s), settings.wind_std_mps)
         };
-        let travelled_m = half_s * (from.speed_mps + to.speed_mps);
         FilterStep {
             duration_s,
             travelled_m,
@@ -266,28 +283,31 @@ mod tests {
         }
     }
 
-    /// Variance of the impulse over 20 s by where on the line a gradient changes by 6 ‰ under a train of
-    /// 100 m, which passes it at 20 m/s.
-    fn place_variance(rate_hz: i64, position_noise_m: f64) -> f64 {
-        let settings = TrainKalmanSettings { wind_std_mps: 0.0, ..Default::default() };
+    /// Returns the step between two samples of a train with usual settings and Davis 1.5, 0.02 and 0.001.
+    fn step(steps: &mut StepBuilder, from: &UnitSample, to: &UnitSample) -> FilterStep {
         let resistance = ResistanceBelief::declared(&Davis { a: 1.5, b: 0.02, c: 0.001 }, 0.4);
-        let learned = LearnedState::new(&settings, &resistance);
+        let learned = LearnedState::new(&TrainKalmanSettings::default(), &resistance);
+        steps.to((from, to), &ResolvedSample::coasting(), (0.0, &learned), &resistance)
+    }
+
+    /// Variance of the impulse over 400 m by where on the line a gradient changes by 6 ‰ under a train of 100 m, which
+    /// passes it at a speed.
+    fn place_variance(rate_hz: i64, position_noise_m: f64, speed_mps: f64) -> f64 {
+        let settings = TrainKalmanSettings { wind_std_mps: 0.0, ..Default::default() };
         let mut steps = StepBuilder::new(&settings, 100.0);
         let sample = |k: i64| {
             let time_s = k as f64 / rate_hz as f64;
             let noise_m = if k % 2 == 0 { position_noise_m } else { -position_noise_m };
-            let under_m = (20.0 * (time_s - 5.0) + noise_m).clamp(0.0, 100.0);
-            UnitSample { known: 0.06 * under_m, ..coasting(k * SECOND_NS / rate_hz, 20.0) }
+            let under_m = (speed_mps * time_s - 100.0 + noise_m).clamp(0.0, 100.0);
+            UnitSample { known: 0.06 * under_m, ..coasting(k * SECOND_NS / rate_hz, speed_mps) }
         };
         steps.see(&sample(0));
         let of_step = |k: i64| {
             let (from, to) = (sample(k - 1), sample(k));
             steps.see(&to);
-            steps
-                .to((&from, &to), &ResolvedSample::coasting(), (0.0, &learned), &resistance)
-                .impulse_variance
+            step(&mut steps, &from, &to).impulse_variance
         };
-        (1..20 * rate_hz).map(of_step).sum()
+        (1..(400.0 / speed_mps) as i64 * rate_hz).map(of_step).sum()
     }
 
     #[test]
@@ -329,16 +349,13 @@ mod tests {
 
     #[test]
     fn a_brake_whose_report_fades_before_the_stop_may_act_until_the_train_is_driven() {
-        let resistance = ResistanceBelief::declared(&Davis { a: 1.5, b: 0.02, c: 0.001 }, 0.4);
-        let learned = LearnedState::new(&TrainKalmanSettings::default(), &resistance);
         // The standard deviation of the brake force 10 s after the end of its report.
         let std = |speed_mps: f64, traction: f64| {
             let mut steps = StepBuilder::new(&TrainKalmanSettings::default(), 100.0);
             steps.see(&UnitSample { brake: 30.0, ..coasting(0, speed_mps) });
             let after = |k: i64| UnitSample { traction, ..coasting(k * SECOND_NS / 10, speed_mps) };
             (1..=100).for_each(|k| steps.see(&after(k)));
-            let at = (&after(99), &after(100));
-            let step = steps.to(at, &ResolvedSample::coasting(), (0.0, &learned), &resistance);
+            let step = step(&mut steps, &after(99), &after(100));
             step.brake_std / step.duration_s
         };
         assert!((std(3.0, 0.0) - 30.0).abs() < 1e-9);
@@ -346,12 +363,38 @@ mod tests {
     }
 
     #[test]
-    fn a_change_of_gradient_is_as_uncertain_at_any_rate_and_with_noise_of_the_position() {
-        // 3 m at 20 m/s, 6 ‰; the average over a second takes off some of it.
-        let whole = (3.0 / 20.0 * 6.0_f64).powi(2);
+    fn a_starting_train_is_held_no_longer_than_there_is_pressure_in_its_cylinders() {
+        // The standard deviation of the brake force 1 s after the end of its report, by the pressure after a time in s.
+        let std = |pressure_pa: fn(f64) -> Option<f64>| {
+            let mut steps = StepBuilder::new(&TrainKalmanSettings::default(), 100.0);
+            steps.see_pressure(pressure_pa(0.0));
+            steps.see(&UnitSample { brake: 30.0, ..coasting(0, 0.0) });
+            let after = |k: i64| UnitSample { traction: 5.0, ..coasting(k * SECOND_NS / 10, 1.0) };
+            for k in 1..=10 {
+                steps.see_pressure(pressure_pa(0.1 * k as f64));
+                steps.see(&after(k));
+            }
+            let step = step(&mut steps, &after(9), &after(10));
+            step.brake_std / step.duration_s
+        };
+        let by_lag = 30.0 * (-1.0_f64 / 1.5).exp();
+        assert!((std(|_| None) - by_lag).abs() < 1e-9);
+        assert!((std(|_| Some(2e5)) - by_lag).abs() < 1e-9, "a sensor that does not follow");
+        let by_pressure = 30.0 * (-1.0_f64 / 0.3).exp();
+        assert!((std(|time_s| Some(2e5 * (-time_s / 0.3).exp())) - by_pressure).abs() < 1e-9);
+        assert_eq!(std(|time_s| Some(if time_s < 0.5 { 2e5 } else { 0.0 })), 0.0);
+    }
+
+    #[test]
+    fn a_change_of_gradient_is_as_uncertain_at_any_rate_and_speed_and_with_noise_of_the_position() {
         for (rate_hz, noise_m) in [(5, 0.0), (10, 0.0), (50, 0.0), (10, 1.0), (50, 1.0)] {
-            let share = place_variance(rate_hz, noise_m) / whole;
-            assert!((0.7..1.1).contains(&share), "{rate_hz} Hz, {noise_m} m: {share}");
+            for speed_mps in [20.0, 1.0] {
+                // 3 m, 6 ‰; the average over a second or 10 m takes off some of it.
+                let whole = (3.0 / speed_mps * 6.0_f64).powi(2);
+                let share = place_variance(rate_hz, noise_m, speed_mps) / whole;
+                let case = format!("{rate_hz} Hz, {noise_m} m, {speed_mps} m/s: {share}");
+                assert!((0.7..1.1).contains(&share), "{case}");
+            }
         }
     }
 }
