@@ -38,6 +38,8 @@ pub struct Grade {
     pub parameters: Vec<ParameterGrade>,
     /// The same for the estimates from the held-out runs alone.
     pub held_out: Vec<ParameterGrade>,
+    /// The same for a, b and c.
+    pub davis: Vec<ParameterGrade>,
     /// For every effect, the p-value of its size in the held-out runs if it is the same as in the fitted runs.
     pub held_out_chances: Vec<f64>,
     /// Evidence, error reduction and parameters of the named effects, for people.
@@ -89,7 +91,22 @@ pub fn grade(
             held_out_chances.extend(own["held_out"]["p_value"].as_f64());
         }
     }
+    let (base, truth) = (&answer.base, simulated.train.resistance);
+    let davis = [
+        ("a", base.a, base.std.a, truth.a),
+        ("b", base.b, base.std.b, truth.b),
+        ("c", base.c, base.std.c, truth.c),
+    ];
+    let davis = davis.map(|(name, value, std, truth)| ParameterGrade {
+        name: name.into(),
+        error: value / truth - 1.0,
+        z: (value - truth) / std,
+    });
+    // A force without a name shares its mean with them.
+    let is_comparable = simulated.verdict() != "unknown";
+    let davis = davis.into_iter().filter(|_| is_comparable).collect();
     Grade {
+        davis,
         details,
         named,
         verdict: verdict.into(),

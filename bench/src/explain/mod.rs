@@ -101,6 +101,7 @@ fn print_case(case: &SimulatedCase, grade: &Grade) {
     if !grade.held_out.is_empty() {
         report_line(&format!("    by the runs held out {}", off(&grade.held_out)));
     }
+    report_line(&format!("    {}", off(&grade.davis)));
     report_line(&format!("    acceptance score {:.2}", grade.acceptance_score));
     for detail in &grade.details {
         report_line(&format!("    {detail}"));
@@ -145,6 +146,14 @@ fn summary(grades: &[(ExplainScenario, Vec<Grade>)]) -> (Value, String) {
         );
     }
     let right = || all().filter(|grade| grade.is_right);
+    let davis: Vec<bool> =
+        right().flat_map(|grade| grade.davis.iter().map(ParameterGrade::is_held)).collect();
+    if !davis.is_empty() {
+        let percent = 100.0 * share(davis.iter().copied());
+        let count = davis.len();
+        text +=
+            &format!("95 % intervals of a, b, c that hold the truth: {percent:.1} % of {count}\n");
+    }
     let held_out: Vec<bool> =
         right().flat_map(|grade| grade.held_out.iter().map(ParameterGrade::is_held)).collect();
     let chances: Vec<f64> =

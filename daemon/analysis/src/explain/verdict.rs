@@ -43,6 +43,9 @@ pub fn answer(
     diagnostics: Vec<DatasetDiagnostic>,
 ) -> ExplainAnswer {
     let (fit, std) = (&outcome.fit, &known.deviations.std);
+    // The coefficients of the updated model predict best without the usual errors, and make up for these.
+    let joint = outcome.nuisance_fit();
+    let davis = &joint.as_ref().map_or(fit, |joint| &joint.fit).theta;
     let effects = effect_answers(search, outcome, known);
     // An effect without a name has no competing hypotheses either.
     let is_unknown = fit.model.has(EffectKind::Unknown);
@@ -72,9 +75,9 @@ pub fn answer(
         ambiguous_with: kinds_of(&competing),
         experiment,
         base: BaseAnswer {
-            a: fit.theta[0],
-            b: fit.theta[1],
-            c: fit.theta[2],
+            a: davis[0],
+            b: davis[1],
+            c: davis[2],
             std: DavisDeviations { a: std[0], b: std[1], c: std[2] },
             told_by_data: told_by_data(search.problem, std),
         },
