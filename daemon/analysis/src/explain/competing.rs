@@ -3,8 +3,8 @@
 use dynocar_shared::vocabulary::{self, EffectKind};
 
 use super::answer::RunnerUp;
-use super::effects::UNKNOWN;
-use super::evidence::{EQUAL, Fit, SCORE_MIN};
+use super::effects::{SharedHypothesis, UNKNOWN};
+use super::evidence::{EQUAL, SCORE_MIN};
 use super::selection::{
     EffectTrial, Refusal, Search, SearchOutcome, is_certain_with_nuisance, penalty,
 };
@@ -72,15 +72,17 @@ fn fits_as_well(
     let finished = &outcome.likeliest;
     let Some(index) = finished.model.position(accepted) else { return false };
     let rest = search.without(finished, index);
+    let with = |effect: SharedHypothesis, start: Vec<f64>| {
+        let fit = search.problem.grown(&rest, [(effect, start)]);
+        fit.cost + penalty(&fit, fit.model.effects.len() - 1)
+    };
+    let own = finished.model.effects[index].clone();
     let (effect, start) = trial.last_parts();
-    let site = finished.model.effects[index].site();
-    let at_its_place = site.and_then(|site| effect.at_site(site.clone()));
-    let price = |fit: &Fit, number: usize| fit.cost + penalty(fit, number);
-    let own = price(finished, index);
-    [Some(effect), at_its_place].into_iter().flatten().any(|effect| {
-        let other = search.problem.grown(&rest, [(effect, start.clone())]);
-        price(&other, other.model.effects.len() - 1) < own + EQUAL
-    })
+    let at_its_place = own.site().and_then(|site| effect.at_site(site.clone()));
+    // Fitted again like the others: the finished fit has come further.
+    let own = with(own, finished.effect_parameters(index).to_vec());
+    let mut others = [Some(effect), at_its_place].into_iter().flatten();
+    others.any(|effect| with(effect, start.clone()) < own + EQUAL)
 }
 
 /// Returns whether a trial could stand in the place of the accepted one as the search saw them.

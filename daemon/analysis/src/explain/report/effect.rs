@@ -111,18 +111,14 @@ pub fn small(outcome: &SearchOutcome, trial: &EffectTrial) -> String {
     let effect = &trial.fit.model.effects[trial.last()];
     let tried = trial.fit.effect_parameters(trial.last());
     let values = outcome.values(trial.kind).unwrap_or(tried);
-    let mut by_name: Vec<(&str, Vec<f64>)> = Vec::new();
-    for (spec, value) in effect.parameters().iter().zip(values) {
-        match by_name.iter_mut().find(|(name, _)| *name == spec.name) {
-            Some((_, values)) => values.push(*value),
-            None => by_name.push((spec.name, vec![*value])),
-        }
-    }
-    let each = by_name.iter().map(|(name, values)| {
-        let (words, unit) = words::parameter(name);
-        let value = match span(values.iter().copied()) {
+    // One number, or one for each run.
+    let each = effect.parameters().chunk_by(|one, other| one.name == other.name);
+    let mut values = values.iter().copied();
+    let each = each.map(|specs| {
+        let (words, unit) = words::parameter(specs[0].name);
+        let value = match span(values.by_ref().take(specs.len())) {
             Some([least, greatest]) if least < greatest => format!("{least:.4} to {greatest:.4}"),
-            _ => format!("{:.4}", values[0]),
+            value => format!("{:.4}", value.map_or(f64::NAN, |[value, _]| value)),
         };
         format!("{words} {value} {unit}").trim_end().to_owned()
     });
@@ -272,8 +268,8 @@ pub fn verdict_words(
 ) -> VerdictWords {
     let is_contested = |it: &&EffectAnswer| competing.iter().any(|c| c.accepted.name() == it.kind);
     let (contested, sure): (Vec<&EffectAnswer>, Vec<_>) = effects.iter().partition(is_contested);
-    let listed = |effects: &[&EffectAnswer]| {
-        effects.iter().map(|it| described(it)).collect::<Vec<_>>().join("; and ")
+    let listed = |list: &[&EffectAnswer]| {
+        list.iter().map(|it| described(it)).collect::<Vec<_>>().join("; and ")
     };
     let found = listed(&effects.iter().collect::<Vec<_>>());
     let has_form = effects.iter().any(|it| it.kind == EffectKind::Unknown.name());
@@ -281,13 +277,11 @@ pub fn verdict_words(
         1 => "Found: the declared model lacks one effect".to_owned(),
         count => format!("Found: the declared model lacks {count} effects"),
     };
-    let open = match sure.is_empty() {
-        true => "Something undeclared acts, but these runs do not show what",
-        false => "Something else undeclared acts, but these runs do not show what",
-    };
+    let something = if sure.is_empty() { "Something" } else { "Something else" };
+    let open = format!("{something} undeclared acts, but these runs do not show what");
     let heading = match (verdict, sure.len()) {
         (Verdict::Effect, count) => lacking(count),
-        (Verdict::Ambiguous, 0) => open.into(),
+        (Verdict::Ambiguous, 0) => open.clone(),
         (Verdict::Ambiguous, count) => format!("{}. {open}", lacking(count)),
         (Verdict::Unknown, _) => {
             "Something undeclared acts that no effect of the library explains".into()
@@ -301,8 +295,8 @@ pub fn verdict_words(
     let whole = match verdict {
         Verdict::Effect => format!("Found: {found}"),
         Verdict::Ambiguous => {
-            let found =
-                if sure.is_empty() { String::new() } else { format!("Found: {}. ", listed(&sure)) };
+            let found = Some(listed(&sure)).filter(|it| !it.is_empty());
+            let found = found.map_or(String::new(), |found| format!("Found: {found}. "));
             let rivals = kinds_of(competing).into_iter().map(|it| kind_name(it).to_owned());
             let rivals: Vec<String> = rivals.collect();
             let explain = if rivals.len() == 1 { "explains" } else { "explain" };
