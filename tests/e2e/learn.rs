@@ -334,7 +334,7 @@ fn a_signal_ends_a_learner_in_the_middle_of_an_explanation_and_nothing_is_conclu
 }
 
 #[test]
-fn where_some_runs_show_no_effect_all_of_them_are_explained_but_those_that_cannot_be_read() {
+fn where_some_runs_show_no_effect_all_that_can_be_read_are_explained() {
     let kinds = EffectRequest::Kinds(vec![EffectKind::WheelDiameter]);
     let work = Workplace::new(&SimulatorSettings {
         runs: 48,
@@ -358,6 +358,15 @@ fn where_some_runs_show_no_effect_all_of_them_are_explained_but_those_that_canno
     assert_eq!(model.origin.effects[0].kind, "wheel_diameter");
     let runs = model.origin.files.iter().filter(|file| file.path.ends_with(".csv"));
     assert_eq!(runs.count(), 47);
+    // So few are left that the search uses all.
+    for number in 4..=9 {
+        std::fs::write(work.path(&format!("runs/all/runs/{number:02}.csv")), "").unwrap();
+    }
+    std::fs::remove_dir_all(work.path("models")).unwrap();
+    let outcome = learn(few);
+    let [model] = &learned(&work.models())[..] else { panic!("{outcome:?}") };
+    let runs = model.origin.files.iter().filter(|file| file.path.ends_with(".csv"));
+    assert_eq!(runs.count(), 41);
 }
 
 #[test]

@@ -171,7 +171,7 @@ pub fn read(
     bounds: &Bounds,
     memory: &mut LearnerMemory,
 ) -> Option<Pool> {
-    let is_few = chosen.len() <= bounds.runs;
+    let is_few = held_of(chosen.len()).is_none();
     let mut kept: Vec<(FoundRun, Run)> = Vec::new();
     let (mut time_s, mut samples) = (0.0, Vec::new());
     for found in chosen.iter().rev() {
@@ -200,36 +200,43 @@ pub fn read(
     kept.reverse();
     samples.reverse();
     let (runs, known): (Vec<FoundRun>, Vec<Run>) = kept.into_iter().unzip();
-    if !is_few && runs.len() <= bounds.runs {
+    let held = held_of(runs.len()).filter(|_| !is_few);
+    if !is_few && held.is_none() {
         return read(&runs, declared, bounds, memory);
     }
-    let mut pool = Pool { dataset: declared.dataset(known), runs, held: None };
-    pool.number()?;
-    let Some(held) = Held::of(pool.dataset.runs.iter().map(|run| run.role)).filter(|_| !is_few)
-    else {
-        return Some(pool);
+    let of_held = |held: &Held| {
+        let own = samples.iter().enumerate().filter(|(index, _)| held.holds(*index));
+        own.map(|it| it.1).sum::<usize>()
     };
-    let of_held = samples.iter().enumerate().filter(|(index, _)| held.holds(*index));
-    let in_memory: usize = of_held.map(|it| it.1).sum();
-    pool.held = Some(held);
-    (in_memory <= bounds.samples).then_some(pool)
+    if held.as_ref().is_some_and(|held| of_held(held) > bounds.samples) {
+        return None;
+    }
+    let mut pool = Pool { dataset: declared.dataset(known), runs, held };
+    pool.number();
+    (pool.runs.len() > 1).then_some(pool)
+}
+
+/// Returns the roles of some number of runs: the last ones are held out.
+fn roles(count: usize) -> impl Iterator<Item = Role> + Clone {
+    let held_out = (HELD_OUT_SHARE * count as f64).ceil() as usize;
+    let fit = count - held_out.min(count.saturating_sub(1));
+    (0..count).map(move |index| if index < fit { Role::Fit } else { Role::Holdout })
+}
+
+/// Returns which of some number of runs the search uses; `None` where it uses all.
+fn held_of(count: usize) -> Option<Held> {
+    Held::of(roles(count))
 }
 
 impl Pool {
-    /// Numbers the runs, the last ones held out; `None` where fewer than two are left.
-    fn number(&mut self) -> Option<()> {
-        let count = self.runs.len();
-        if count < 2 {
-            return None;
-        }
-        let held_out = ((HELD_OUT_SHARE * count as f64).ceil() as usize).min(count - 1);
-        for (index, (found, run)) in self.runs.iter().zip(&mut self.dataset.runs).enumerate() {
+    /// Names and numbers the runs, and gives them their roles.
+    fn number(&mut self) {
+        let runs = self.runs.iter().zip(&mut self.dataset.runs).zip(roles(self.runs.len()));
+        for (index, ((found, run), role)) in runs.enumerate() {
             run.file.clone_from(&found.name);
-            run.role = if index + held_out < count { Role::Fit } else { Role::Holdout };
-            run.number = index as u32 + 1;
+            (run.role, run.number) = (role, index as u32 + 1);
             run.samples.iter_mut().for_each(|sample| sample.run = run.number);
         }
-        Some(())
     }
 
     /// Explains the runs; many are read again, one after the other.
@@ -333,6 +340,14 @@ mod tests {
             sha256: format!("{day}-{number}"),
             described: String::new(),
         }
+    }
+
+    #[test]
+    fn the_last_fifth_is_held_out_and_many_runs_begin_where_a_search_leaves_some_out() {
+        let held_out = |count| roles(count).filter(|role| *role == Role::Holdout).count();
+        assert_eq!([0, 1, 2, 5, 41].map(held_out), [0, 0, 1, 1, 9]);
+        let many: Vec<usize> = (0..60).filter(|count| held_of(*count).is_some()).collect();
+        assert_eq!(many, (42..60).collect::<Vec<_>>());
     }
 
     #[test]
