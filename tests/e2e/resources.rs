@@ -83,7 +83,7 @@ fn lines_that_nobody_takes_are_dropped_counted_and_said() {
         |train| matches!(Peer::look_up(&host, train, Role::Daemon), Ok(Peer::Compatible(_)));
     await_true(|| (1..=TRAINS).all(|it| is_there(TrainId(it))), || "the daemon".into());
     // Each coming and going of their controllers is worth 120 lines, of which some 1200 wait.
-    for _ in 0..14 {
+    for _ in 0..20 {
         let claim = |it| RoleLock::claim(&host, TrainId(it), Role::Controller).unwrap();
         let controllers: Vec<RoleLock> = (1..=TRAINS).map(claim).collect();
         std::thread::sleep(Duration::from_millis(600));

@@ -34,13 +34,15 @@ pub fn competing_hypotheses(search: &Search, outcome: &SearchOutcome) -> Vec<Com
     let effects = &outcome.fit.model.effects;
     let of = |accepted: EffectKind, tried: &[EffectTrial], twins: &[EffectKind]| {
         let own = tried.iter().find(|trial| trial.kind == accepted);
+        let is_other = |kind: EffectKind| !outcome.fit.model.has(kind);
         let close = tried.iter().filter(|trial| {
-            own.is_some_and(|own| comes_close(trial, own, outcome))
+            is_other(trial.kind)
+                && own.is_some_and(|own| comes_close(trial, own, outcome))
                 && fits_as_well(search, trial, accepted, outcome)
         });
         let mut kinds: Vec<EffectKind> = Vec::new();
         for kind in twins.iter().copied().chain(close.map(|trial| trial.kind)) {
-            if !outcome.fit.model.has(kind) && !kinds.contains(&kind) {
+            if is_other(kind) && !kinds.contains(&kind) {
                 kinds.push(kind);
             }
         }
