@@ -27,6 +27,7 @@ mod init;
 mod init_refused;
 mod learn;
 mod learn_page;
+mod learn_workplace;
 mod logger_files;
 mod output;
 mod own_train;

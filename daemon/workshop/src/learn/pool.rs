@@ -19,6 +19,7 @@ use dynocar_analysis::explain::{Explanation, explain, explain_many};
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use toml::Table;
+use tracing::warn;
 
 use super::available_runs::{FoundRun, report_unusable};
 use super::memory::LearnerMemory;
@@ -199,21 +200,27 @@ pub fn read(
     }
     kept.reverse();
     samples.reverse();
-    let (runs, known): (Vec<FoundRun>, Vec<Run>) = kept.into_iter().unzip();
+    let (runs, mut known): (Vec<FoundRun>, Vec<Run>) = kept.into_iter().unzip();
     let held = held_of(runs.len()).filter(|_| !is_few);
     if !is_few && held.is_none() {
         return read(&runs, declared, bounds, memory);
     }
-    let of_held = |held: &Held| {
-        let own = samples.iter().enumerate().filter(|(index, _)| held.holds(*index));
-        own.map(|it| it.1).sum::<usize>()
-    };
-    if held.as_ref().is_some_and(|held| of_held(held) > bounds.samples) {
-        return None;
+    if let Some(held) = &held {
+        let of_held = samples.iter().enumerate().filter(|(index, _)| held.holds(*index));
+        let (in_memory, most) = (of_held.map(|it| it.1).sum::<usize>(), bounds.samples);
+        if in_memory > most {
+            let count = runs.len();
+            warn!(
+                "{count} runs are not explained together: {in_memory} samples, expected {most} at most"
+            );
+            return None;
+        }
     }
-    let mut pool = Pool { dataset: declared.dataset(known), runs, held };
-    pool.number();
-    (pool.runs.len() > 1).then_some(pool)
+    let places = roles(runs.len()).enumerate();
+    for ((found, run), place) in runs.iter().zip(&mut known).zip(places) {
+        enroll(run, found, place);
+    }
+    (runs.len() > 1).then(|| Pool { dataset: declared.dataset(known), runs, held })
 }
 
 /// Returns the roles of some number of runs: the last ones are held out.
@@ -228,17 +235,14 @@ fn held_of(count: usize) -> Option<Held> {
     Held::of(roles(count))
 }
 
-impl Pool {
-    /// Names and numbers the runs, and gives them their roles.
-    fn number(&mut self) {
-        let runs = self.runs.iter().zip(&mut self.dataset.runs).zip(roles(self.runs.len()));
-        for (index, ((found, run), role)) in runs.enumerate() {
-            run.file.clone_from(&found.name);
-            (run.role, run.number) = (role, index as u32 + 1);
-            run.samples.iter_mut().for_each(|sample| sample.run = run.number);
-        }
-    }
+/// Names and numbers a run of a pool by its place, and gives it its role.
+fn enroll(run: &mut Run, found: &FoundRun, (index, role): (usize, Role)) {
+    run.file.clone_from(&found.name);
+    (run.role, run.number) = (role, index as u32 + 1);
+    run.samples.iter_mut().for_each(|sample| sample.run = run.number);
+}
 
+impl Pool {
     /// Explains the runs; many are read again, one after the other.
     ///
     /// # Errors
@@ -251,11 +255,9 @@ impl Pool {
     ) -> Result<Explanation, UnusableRun> {
         let Some(held) = &self.held else { return Ok(explain(&self.dataset, progress)?) };
         let read = |index: usize| {
-            let mut run = declared.read(&self.runs[index])?;
-            let known = &self.dataset.runs[index];
-            run.file.clone_from(&known.file);
-            (run.role, run.number) = (known.role, known.number);
-            run.samples.iter_mut().for_each(|sample| sample.run = known.number);
+            let found = &self.runs[index];
+            let mut run = declared.read(found)?;
+            enroll(&mut run, found, (index, self.dataset.runs[index].role));
             Ok::<_, UnusableRun>(run)
         };
         let chosen = (0..self.runs.len()).filter(|index| held.holds(*index)).map(read);
