@@ -140,7 +140,7 @@ fn explained<E: From<RunDataError> + Send>(
         None => false,
     };
     let seen = if is_joined { Density::Recorded } else { density };
-    let deviations = selection::deviations_given(&outcome, seen.step_s(recorded_step_s));
+    let deviations = selection::deviations_given(&problem, &outcome, seen.step_s(recorded_step_s));
     progress(0.95, "scoring the holdout runs");
     let judged = judged(many.as_ref(), &search, &preparation, &outcome)?;
     let scores = judged.iter().map(|run| run.score.clone()).collect();

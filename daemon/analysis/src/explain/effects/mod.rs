@@ -15,6 +15,7 @@ mod dragging_brake;
 mod force_gain;
 mod gradient_error;
 mod gradient_shift;
+mod gradient_under_train;
 mod lateness;
 mod local_resistance;
 mod low_adhesion;
@@ -25,7 +26,6 @@ mod speed_delay;
 mod tunnel_drag;
 mod unknown;
 mod usual_errors;
-mod vertical_curves;
 mod wheel_diameter;
 mod wind;
 
@@ -37,11 +37,11 @@ pub use super::hypothesis::{
     SharedHypothesis, Turn,
 };
 pub use gradient_error::map_error;
+pub use gradient_under_train::{USUAL_LENGTH_M, mass_centre, vertical_curves};
 pub use proposal::{
     Candidate, Certainty, DeclaredFigure, Effect, Everyday, Policy, Proposal, Whole,
 };
 pub use usual_errors::{map_error_as_fitted, usual_errors};
-pub use vertical_curves::{USUAL_LENGTH_M, vertical_curves};
 
 /// Every kind, in the order of the search: timing, scales, mass and gain, effects tied to a place, environment,
 /// actuators. Forces outside the library come last.

@@ -14,6 +14,8 @@ pub(super) const MOVING_MPS: f64 = 0.8;
 pub(super) const SEGMENT_GAP_MAX_S: f64 = 5.0;
 /// Least number of bins of a segment that is used.
 const SEGMENT_BINS_MIN: usize = 4;
+/// Time in s before and after reported sliding in which the wheels may slip, too: it is reported above a threshold.
+const SLIDE_MARGIN_S: f64 = 1.0;
 /// Time in s for which the couplings of a train oscillate after a change of force.
 const RINGING_S: f64 = 6.0;
 
@@ -33,6 +35,8 @@ pub struct Bin {
     /// By how much in m/s² the acceleration of the control force changed from a few seconds before
     /// to its end.
     pub jump_mps2: f64,
+    /// Whether the wheels slip or slide, so that their speed is not the train's.
+    pub is_sliding: bool,
 }
 
 impl Bin {
@@ -104,10 +108,19 @@ fn segment_bins(
             time_s: mean(&|i| time_s[i]),
             speed_mps: mean(&|i| samples[i].speed_mps),
             jump_mps2: jump_mps2(recording, from, to),
+            is_sliding: slides(recording, from, to),
         });
         from = to;
     }
     bins
+}
+
+/// Returns whether sliding is reported between two samples or close to them.
+fn slides(recording: &OpenLoopRecording, from: usize, to: usize) -> bool {
+    let (samples, time_s) = (recording.samples(), recording.time_s());
+    let first = time_s.partition_point(|&at_s| at_s < time_s[from] - SLIDE_MARGIN_S);
+    let end = time_s.partition_point(|&at_s| at_s <= time_s[to - 1] + SLIDE_MARGIN_S);
+    samples[first..end].iter().any(|sample| sample.is_sliding)
 }
 
 /// Range in m/s² of the acceleration of the control force, where it is known, from [`RINGING_S`] before

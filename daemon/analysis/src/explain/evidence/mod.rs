@@ -20,6 +20,7 @@ mod positions;
 mod run_data;
 mod run_scatter;
 mod sample_forces;
+mod slides;
 mod thinning;
 mod whitener;
 

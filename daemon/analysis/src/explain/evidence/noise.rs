@@ -1,9 +1,14 @@
 //! Random process that remains when the model is right.
 
+use super::bins::Bin;
+
 /// Shares of the slow part of a noise under which a kind is tried again.
 const STIFF_SHARES: [f64; 2] = [0.01, 1e-4];
 /// Least variance in (m/s²)² of a fading force.
 const FADING_VAR_MIN: f64 = 1e-10;
+
+/// Variance in (m/s)² of the train's speed where that of its wheels says nothing of it.
+const SLIDE_VAR: f64 = 100.0;
 
 /// Noise of the bins: white measurement noise, a white force, and a force that fades with a time constant
 /// (Ornstein-Uhlenbeck), such as gusts or a rough map leave. Where the control force changes, the car with the speed
@@ -59,12 +64,12 @@ impl Noise {
         (white_density * over_s + 2.0 * fading_var * fading_s * lasting_s).sqrt() / over_s
     }
 
-    /// Variance in (m/s)² of the mean speed of a bin before which the control force changed by an
-    /// acceleration.
+    /// Variance in (m/s)² of the mean speed of a bin.
     #[inline]
-    pub(super) fn bin_var(&self, jump_mps2: f64) -> f64 {
-        let of_jump_mps = self.jump_s * jump_mps2;
-        self.measurement_var + of_jump_mps * of_jump_mps
+    pub(super) fn bin_var(&self, bin: &Bin) -> f64 {
+        let of_jump_mps = self.jump_s * bin.jump_mps2;
+        let of_slide = if bin.is_sliding { SLIDE_VAR } else { 0.0 };
+        self.measurement_var + of_jump_mps * of_jump_mps + of_slide
     }
 
     pub(super) fn to_logs(self) -> [f64; 4] {

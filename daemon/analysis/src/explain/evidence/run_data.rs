@@ -19,6 +19,7 @@ use super::bins::{self, Bin};
 use super::drift::drift_m;
 use super::positions::{by_part_s, distance_ratio};
 use super::sample_forces::DeclaredForces;
+use super::slides::mark_slides;
 use super::thinning::{MEAN_S, clean, thinned};
 
 /// A run, ready for fitting and for open-loop simulation.
@@ -253,7 +254,10 @@ fn prepare_run(
             move_positions(&mut rows, reported.samples(), &moved_m);
         }
     }
-    let (samples, replaced) = readers.as_known.read(&rows);
+    let (mut samples, replaced) = readers.as_known.read(&rows);
+    if run.power().is_none() {
+        mark_slides(&mut samples);
+    }
     let mut recording = OpenLoopRecording::new(samples).map_err(unusable)?;
     let rejected = rows.len() - recording.samples().len();
     let first_ns = recording.samples().first().map_or(0, |sample| sample.time_ns);

@@ -114,7 +114,7 @@ impl Walk {
     #[inline]
     fn step(&mut self, bin: &Bin) -> (Step, f64) {
         let Noise { fading_var, fading_s, .. } = self.noise;
-        let bin_var = self.noise.bin_var(bin.jump_mps2);
+        let bin_var = self.noise.bin_var(bin);
         let step_s = self.before.map_or(0.0, |(_, time_s)| bin.time_s - time_s);
         let starts = self.before.is_none_or(|(segment, _)| segment != bin.segment);
         self.before = Some((bin.segment, bin.time_s));

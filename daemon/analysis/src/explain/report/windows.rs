@@ -136,6 +136,7 @@ mod tests {
             time_s: 2.0 * k as f64,
             speed_mps: 10.0,
             jump_mps2: 0.0,
+            is_sliding: false,
         };
         segments.iter().enumerate().map(bin).collect()
     }

@@ -2,6 +2,7 @@
 
 mod acceptance;
 mod by_run;
+mod davis_form;
 mod nuisance;
 mod outcome;
 mod outside;

@@ -6,6 +6,7 @@
 
 use std::sync::Arc;
 
+use dynocar_model::train::Davis;
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -13,16 +14,17 @@ use super::acceptance::{
     CERTAIN_RUNS_MIN, is_certain, is_left_by_moved_places, is_material, is_possible, moves_places,
 };
 use super::by_run::{Deviations, deviations, deviations_with_nuisance};
+use super::davis_form::davis_form_std;
 use super::outcome::{
     EffectTrial, NuisanceFit, Refusal, SearchOutcome, at_bound, penalty, round_of,
 };
 use super::search::Search;
 use super::trying::{Asked, PROMISE_TIMES};
 use crate::explain::effects::{
-    Candidate, DeclaredFigure, USUAL_LENGTH_M, map_error, map_error_as_fitted, policy_of,
-    usual_errors, vertical_curves,
+    Candidate, DeclaredFigure, USUAL_LENGTH_M, map_error, map_error_as_fitted, mass_centre,
+    policy_of, usual_errors, vertical_curves,
 };
-use crate::explain::evidence::Fit;
+use crate::explain::evidence::{Fit, FitProblem};
 use crate::explain::places::{SURVEYED, span_m};
 
 /// Returns whether some evidence makes the last effect of a trial certain jointly with the usual errors.
@@ -77,16 +79,17 @@ impl Search<'_> {
         joint
     }
 
-    /// Returns the errors of the map and the rounding of its steps, also for a model with a greater error of the map
-    /// that the runs show; empty where there is no map or no measured position.
+    /// Returns the errors of the map, the place of the train's mass and the rounding of steps, also for a model with a
+    /// greater error of the map that the runs show; empty where there is no map or no measured position.
     fn map_errors(&self, fit: &Fit) -> Vec<Candidate> {
         let track = self.track.filter(|_| self.problem.positions.distance_ratio.is_some());
         let span_m = self.scan(fit).and_then(|scan| span_m(&scan));
         let (Some(track), Some(span_m)) = (track, span_m.filter(|[low, high]| high > low)) else {
             return Vec::new();
         };
-        let rounded = vertical_curves(track.clone(), self.train.length_m, USUAL_LENGTH_M, 0.0);
-        vec![map_error(span_m, SURVEYED), rounded]
+        let length_m = self.train.length_m;
+        let rounded = vertical_curves(track.clone(), length_m, USUAL_LENGTH_M, 0.0);
+        vec![map_error(span_m, SURVEYED), mass_centre(track.clone(), length_m), rounded]
     }
 
     /// Fits again with steps rounded over the length that a fit shows, where it shows another than the usual one: a
@@ -228,11 +231,16 @@ pub fn move_to_nuisance_fit(search: &Search, outcome: &mut SearchOutcome) {
 }
 
 /// Standard deviations of the parameters of a model that was moved with the usual errors last, from samples some s
-/// apart.
-pub fn deviations_given(outcome: &SearchOutcome, step_s: f64) -> Deviations {
+/// apart. Those of a, b and c are no less than their form allows.
+pub fn deviations_given(problem: &FitProblem, outcome: &SearchOutcome, step_s: f64) -> Deviations {
     let count = outcome.fit.theta.len();
     let Some((_, joint)) = &outcome.nuisance_fit else { return deviations(&outcome.fit) };
     let mut deviations = deviations_with_nuisance(&joint.fit, count, joint.shared);
+    let theta = &joint.fit.theta;
+    let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
+    if let Some(floor) = davis_form_std(problem, davis) {
+        deviations.std.iter_mut().zip(floor).for_each(|(std, floor)| *std = std.hypot(floor));
+    }
     let model = &outcome.fit.model;
     for (effect, range) in model.effects.iter().zip(model.ranges()) {
         for std in &mut deviations.std[range.clone()] {
