@@ -22,7 +22,7 @@ const LEAST_MPS: f64 = 0.25;
 const LEAST_SPREADS: f64 = 6.0;
 /// Share of the usual departures that are smaller than one spread.
 const SPREAD_QUANTILE: f64 = 0.75;
-/// Least number of samples with a strong force that show what is usual.
+/// Least number of samples with a strong force that show the usual departures.
 const SAMPLES_MIN: usize = 50;
 /// Greatest share of a run in which wheels slip: more is another effect.
 const SHARE_MAX: f64 = 0.05;

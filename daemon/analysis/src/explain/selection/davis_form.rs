@@ -1,8 +1,8 @@
 //! By how much a, b and c can be wrong because a train's resistance is only nearly a + b v + c v².
 //!
-//! What a model leaves out at some speeds (a train's masses are not spread evenly, gradients change between the places
-//! that a map states) is the same in every run, and a, b and c take it up. No number of runs averages that out: their
-//! deviations have a floor.
+//! The forces that a model leaves out at some speeds are the same in every run, and a, b and c take them up: a train's
+//! mass is not spread evenly, and gradients change between the places that a map states. No number of runs averages
+//! that out, so that the deviations have a floor.
 
 use dynocar_model::train::Davis;
 use nalgebra::{Cholesky, DMatrix, Matrix3, Vector3};
