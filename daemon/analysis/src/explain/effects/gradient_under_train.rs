@@ -33,7 +33,7 @@ const CENTRE_STD_SHARE: f64 = 0.03;
 const CENTRE_MAX_SHARE: f64 = 0.25;
 const CENTRE_HALF_SHARE: f64 = 0.05;
 
-/// What a unit of the parameter adds to the gradient.
+/// Cause of a gradient of its own, in proportion to the parameter.
 #[derive(Clone, Copy, Debug)]
 enum Cause {
     /// Steps rounded over a length in m.
