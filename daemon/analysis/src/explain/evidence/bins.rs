@@ -136,3 +136,28 @@ fn jump_mps2(recording: &OpenLoopRecording, from: usize, to: usize) -> f64 {
     });
     span(accelerations).map_or(0.0, |[least, most]| most - least)
 }
+
+#[cfg(test)]
+mod tests {
+    use dynocar_model::force::ResolvedSample;
+
+    use super::super::coasting;
+    use super::super::noise::Noise;
+    use super::*;
+
+    #[test]
+    fn the_speed_of_a_bin_near_a_reported_slide_counts_for_nothing() {
+        let sample =
+            |k: i64| ResolvedSample { time_ns: k * 500_000_000, is_sliding: k == 25, ..coasting() };
+        let recording = OpenLoopRecording::new((0..60).map(sample).collect()).unwrap();
+        let bins = bins(&recording);
+        // Bins of 2 s from 10 and from 12 s on have a sample within a second of 12.5 s.
+        let near = |bin: &Bin| (10.0..14.0).contains(&bin.time_s);
+        assert!(bins.len() > 10 && bins.iter().all(|bin| bin.is_sliding == near(bin)));
+        let var = |is_near: bool| {
+            let bin = bins.iter().find(|bin| near(bin) == is_near).expect("such a bin");
+            Noise::START.bin_var(bin)
+        };
+        assert!(var(true) > 1e4 * var(false));
+    }
+}
