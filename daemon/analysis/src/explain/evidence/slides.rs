@@ -26,7 +26,7 @@ const SPREAD_QUANTILE: f64 = 0.75;
 const SAMPLES_MIN: usize = 50;
 /// Greatest share of a run in which wheels slip: more is another effect.
 const SHARE_MAX: f64 = 0.05;
-/// Greatest share of as many departures the other way: cars on couplings swing both ways.
+/// Greatest number of departures the other way, as a share of these: cars on couplings swing both ways.
 const BACK_SHARE_MAX: f64 = 0.25;
 
 /// Marks the samples at which wheels slip or slide.
