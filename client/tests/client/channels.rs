@@ -1,5 +1,9 @@
 //! The channels between a controller and a daemon, both played by this process.
 
+use std::fs::Permissions;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use std::sync::Barrier;
 use std::time::Duration;
 
 use dynocar_client::{SamplePublisher, SnapshotReader};
@@ -65,6 +69,51 @@ fn a_receiver_that_never_reads_loses_the_oldest_and_the_sender_goes_on() {
     }
     let first = receiver.receive().unwrap();
     assert_eq!(first.sequence, sent - SAMPLE_BUFFER as u64 + 1);
+}
+
+/// Segments of one kind in the host's shared memory.
+fn segments(host: &Host, suffix: &str) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir("/dev/shm").unwrap().map(|it| it.unwrap().path());
+    let is_ours = |name: &str| name.starts_with(&host.segment_prefix()) && name.ends_with(suffix);
+    entries.filter(|it| is_ours(it.file_name().unwrap().to_str().unwrap())).collect()
+}
+
+#[test]
+fn ends_opened_at_once_are_connected_before_either_is_used() {
+    let bench = bench();
+    for round in 0..50 {
+        let (at_once, both_open) = (Barrier::new(2), Barrier::new(2));
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                let transport = Transport::open(&bench.host, "test-controller").unwrap();
+                at_once.wait();
+                let _receiver = transport.receiver::<TrainSample>(TRAIN).unwrap();
+                both_open.wait();
+                both_open.wait();
+            });
+            at_once.wait();
+            let _sender = bench.transport.sender::<TrainSample>(TRAIN).unwrap();
+            both_open.wait();
+            let connections = segments(&bench.host, ".connection").len();
+            both_open.wait();
+            assert_eq!(connections, 1, "round {round}");
+        });
+    }
+}
+
+#[test]
+fn what_a_killed_maker_left_incomplete_is_removed_before_the_next_port_is_made() {
+    let bench = bench();
+    let prefix = bench.host.segment_prefix();
+    let leave = |name: &str, mode| {
+        let path = Path::new("/dev/shm").join(format!("{prefix}{name}.connection"));
+        std::fs::write(&path, [0; 302]).unwrap();
+        std::fs::set_permissions(&path, Permissions::from_mode(mode)).unwrap();
+        path
+    };
+    let (incomplete, complete) = (leave("incomplete", 0o200), leave("complete", 0o600));
+    let _sender = bench.transport.sender::<TrainSample>(TRAIN).unwrap();
+    assert_eq!(segments(&bench.host, ".connection"), [complete], "{incomplete:?} is still there");
 }
 
 #[test]

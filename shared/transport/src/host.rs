@@ -8,6 +8,7 @@
 use std::fs::{DirBuilder, File, OpenOptions, Permissions};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use dynocar_shared::services::{ROOT_VARIABLE, SEGMENT_PREFIX};
 use iceoryx2::prelude::{Config, FileName, Path as TransportPath, SemanticString};
@@ -25,6 +26,10 @@ const ROOT_BYTES_MAX: usize = 4000;
 /// whenever it is polled: the transport's default of 128 took more than half of the time of a poll. Without a place the
 /// dead sender's last message is dropped, and it is older than the messages of its successor.
 const EXPIRED_CONNECTIONS: usize = 8;
+
+/// Longest wait of the transport for something that another process is making; no process of ours makes anything at the
+/// same time as another.
+const MAKING_TIME: Duration = Duration::from_millis(200);
 
 /// The announcements' directory in the root.
 const TRAINS: &str = "trains";
@@ -158,6 +163,9 @@ impl Host {
         let path =
             TransportPath::new(directory.as_os_str().as_encoded_bytes()).map_err(|_| refused())?;
         config.global.set_root_path(&path);
+        config.global.creation_timeout = MAKING_TIME;
+        // The dead are cleared away by those who come, one at a time, and not by those who leave.
+        config.global.node.cleanup_dead_nodes_on_destruction = false;
         config.defaults.publish_subscribe.subscriber_expired_connection_buffer =
             EXPIRED_CONNECTIONS;
         Ok(config)

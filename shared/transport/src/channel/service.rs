@@ -18,7 +18,7 @@ use iceoryx2::service::builder::publish_subscribe::{
 };
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
-use super::process::Owned;
+use super::process::{LockedFile, Owned};
 use super::users::Users;
 use crate::error::ChannelError;
 
@@ -34,11 +34,13 @@ pub struct Entrance {
 }
 
 impl Entrance {
-    /// Opens or makes the service of a train's channel.
+    /// Opens or makes the service of a train's channel, and lets nobody else make anything until the lock is dropped:
+    /// hold it while making a port. A port connects itself to all others before they see it, so that none of them, in
+    /// the midst of a control cycle, makes a connection or waits for one.
     pub(super) fn service<T: Payload>(
         &self,
         train: TrainId,
-    ) -> Result<PortFactory<ipc::Service, Wire<T>, ()>, ChannelError> {
+    ) -> Result<(PortFactory<ipc::Service, Wire<T>, ()>, LockedFile), ChannelError> {
         let text = service_name::<T>(train);
         let refused = |reason: String| ChannelError::transport(format!("service {text}"), reason);
         let name = ServiceName::new(&text).map_err(|error| refused(format!("{error:?}")))?;
@@ -58,10 +60,10 @@ impl Entrance {
                 .max_subscribers(T::RECEIVERS_MAX)
                 .max_nodes(T::SENDERS_MAX + T::RECEIVERS_MAX)
                 .open_or_create();
-            drop(making);
             match result {
-                Ok(service) => return Ok(service),
+                Ok(service) => return Ok((service, making)),
                 Err(error) if is_settling(&error) && start.elapsed() < SETTLING_TIME => {
+                    drop(making);
                     std::thread::sleep(Duration::from_millis(2));
                 }
                 Err(PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(

@@ -136,8 +136,8 @@ pub(super) fn open_sender<T: Payload>(
     entrance: &Entrance,
     train: TrainId,
 ) -> Result<Sender<T>, ChannelError> {
-    let publisher = entrance
-        .service::<T>(train)?
+    let (service, _making) = entrance.service::<T>(train)?;
+    let publisher = service
         .publisher_builder()
         .max_loaned_samples(1)
         .backpressure_strategy(BackpressureStrategy::DiscardData)
@@ -187,17 +187,15 @@ pub(super) fn open_receiver<T: Payload>(
     entrance: &Entrance,
     train: TrainId,
 ) -> Result<Receiver<T>, ChannelError> {
-    let subscriber = entrance
-        .service::<T>(train)?
-        .subscriber_builder()
-        .buffer_size(T::BUFFER)
-        .create()
-        .map_err(|error| match error {
+    let (service, _making) = entrance.service::<T>(train)?;
+    let subscriber = service.subscriber_builder().buffer_size(T::BUFFER).create().map_err(
+        |error| match error {
             SubscriberCreateError::ExceedsMaxSupportedSubscribers => {
                 no_place_left::<T>(train, T::RECEIVERS_MAX)
             }
             error => refused::<T>(train, "receiver", error),
-        })?;
+        },
+    )?;
     Ok(Receiver { port: Owned::new(Box::new(subscriber)), _users: Arc::clone(&entrance.users) })
 }
 

@@ -4,8 +4,8 @@
 //! user of the host. Here the segment is closed to others, and removed by the last process that leaves. Every port
 //! holds a shared lock on the root directory, which also keeps systemd-tmpfiles out of it. A process that gets an
 //! exclusive lock is alone, and no other can enter until it releases the lock. A process that enters alone removes the
-//! files of processes that were killed; while others are there, the next process that makes a service removes
-//! incomplete services.
+//! files of processes that were killed; while others are there, the next process that makes a service or a port removes
+//! incomplete ones.
 
 use std::fs::{OpenOptions, Permissions, TryLockError};
 use std::os::unix::fs::PermissionsExt;
@@ -66,8 +66,8 @@ impl Users {
         Ok(users)
     }
 
-    /// Begins the making of services and nodes, one process at a time, after removing those that a killed process left
-    /// incomplete; ends when the file is dropped.
+    /// Begins the making of nodes, services or ports, one process at a time, after removing those that a killed process
+    /// left incomplete; ends when the file is dropped.
     ///
     /// # Errors
     ///
@@ -107,25 +107,22 @@ impl Users {
         has_any
     }
 
-    /// Removes the descriptions of services whose maker, or remover, was killed. Nobody else makes one
-    /// meanwhile, and who is removing one has done so in a moment.
+    /// Removes the descriptions of services, and the segments, whose maker or remover was killed: the transport would
+    /// wait for some of them, even when it leaves. Nobody else makes one meanwhile, and who is removing one has done so
+    /// in a moment.
     fn remove_half_made(&self) {
         let half_made = || {
-            let mut services = files_of(&self.host.transport_directory().join("services"));
-            let segments = self.segments(".dynamic");
-            services.retain(|it| !is_complete(it, &segments));
-            services
+            let segments = self.segments("");
+            let mut found = files_of(&self.host.transport_directory().join("services"));
+            found.retain(|it| !is_complete(it, &segments));
+            found.extend(segments.into_iter().filter(|it| is_in_making(it)));
+            found
         };
         let first = half_made();
         if !first.is_empty() {
             std::thread::sleep(5 * PAUSE);
-            for service in half_made().iter().filter(|it| first.contains(it)) {
-                let _ = std::fs::remove_file(service);
-            }
-        }
-        for segment in self.segments(SUFFIX) {
-            if mode_of(&segment) == Some(SEGMENT_IN_MAKING) {
-                let _ = std::fs::remove_file(segment);
+            for file in half_made().iter().filter(|it| first.contains(it)) {
+                let _ = std::fs::remove_file(file);
             }
         }
     }
@@ -204,8 +201,11 @@ fn is_complete(service: &Path, segments: &[PathBuf]) -> bool {
         let name = format!("_{}.dynamic", (number(&text, "unique_value = ")? << 64) | low);
         segments.iter().find(|it| it.to_string_lossy().ends_with(&name))
     };
-    mode_of(service) != Some(DESCRIPTION_IN_MAKING)
-        && segment().is_some_and(|it| mode_of(it) != Some(SEGMENT_IN_MAKING))
+    mode_of(service) != Some(DESCRIPTION_IN_MAKING) && segment().is_some_and(|it| !is_in_making(it))
+}
+
+fn is_in_making(segment: &Path) -> bool {
+    mode_of(segment) == Some(SEGMENT_IN_MAKING)
 }
 
 fn mode_of(path: &Path) -> Option<u32> {
