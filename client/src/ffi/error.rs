@@ -81,6 +81,7 @@ impl From<&ChannelError> for Code {
     fn from(error: &ChannelError) -> Self {
         match error {
             ChannelError::Directory { .. }
+            | ChannelError::Locked { .. }
             | ChannelError::OpenFiles { .. }
             | ChannelError::RootShared { .. }
             | ChannelError::RootOfAnother { .. } => Code::Directory,

@@ -1,6 +1,7 @@
 //! The channels between a controller and a daemon, both played by this process.
 
-use std::fs::Permissions;
+use std::any::Any;
+use std::fs::{File, Permissions};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::Barrier;
@@ -79,24 +80,36 @@ fn segments(host: &Host, suffix: &str) -> Vec<PathBuf> {
 }
 
 #[test]
-fn ends_opened_at_once_are_connected_before_either_is_used() {
+fn ends_opened_at_once_are_connected_before_any_is_used() {
+    const SENDERS: usize = 3;
+    const RECEIVERS: usize = 5;
     let bench = bench();
-    for round in 0..50 {
-        let (at_once, both_open) = (Barrier::new(2), Barrier::new(2));
-        std::thread::scope(|scope| {
-            scope.spawn(|| {
-                let transport = Transport::open(&bench.host, "test-controller").unwrap();
-                at_once.wait();
-                let _receiver = transport.receiver::<TrainSample>(TRAIN).unwrap();
-                both_open.wait();
-                both_open.wait();
-            });
+    let open = |transport: &Transport, index: usize| -> Box<dyn Any> {
+        match index < SENDERS {
+            true => Box::new(transport.sender::<TrainSample>(TRAIN).unwrap()),
+            false => Box::new(transport.receiver::<TrainSample>(TRAIN).unwrap()),
+        }
+    };
+    for round in 0..20 {
+        let (at_once, seen) =
+            (Barrier::new(SENDERS + RECEIVERS), Barrier::new(SENDERS + RECEIVERS));
+        let connections = |index: usize| {
+            let transport = Transport::open(&bench.host, "test-end").unwrap();
             at_once.wait();
-            let _sender = bench.transport.sender::<TrainSample>(TRAIN).unwrap();
-            both_open.wait();
+            let _end = open(&transport, index);
+            at_once.wait();
             let connections = segments(&bench.host, ".connection").len();
-            both_open.wait();
-            assert_eq!(connections, 1, "round {round}");
+            seen.wait();
+            connections
+        };
+        std::thread::scope(|scope| {
+            let connections = &connections;
+            let ends: Vec<_> = (0..SENDERS + RECEIVERS)
+                .map(|index| scope.spawn(move || connections(index)))
+                .collect();
+            for end in ends {
+                assert_eq!(end.join().unwrap(), SENDERS * RECEIVERS, "round {round}");
+            }
         });
     }
 }
@@ -114,6 +127,15 @@ fn what_a_killed_maker_left_incomplete_is_removed_before_the_next_port_is_made()
     let (incomplete, complete) = (leave("incomplete", 0o200), leave("complete", 0o600));
     let _sender = bench.transport.sender::<TrainSample>(TRAIN).unwrap();
     assert_eq!(segments(&bench.host, ".connection"), [complete], "{incomplete:?} is still there");
+}
+
+#[test]
+fn a_process_stopped_while_it_opens_a_channel_is_named_by_its_lock() {
+    let bench = bench();
+    let lock = File::open(bench.host.root().join("services.lock")).unwrap();
+    lock.lock().unwrap();
+    let message = Transport::open(&bench.host, "test-controller").unwrap_err().to_string();
+    assert!(message.contains("services.lock: another process holds this lock"), "{message}");
 }
 
 #[test]

@@ -24,6 +24,17 @@ pub enum ChannelError {
         /// The system's answer.
         source: std::io::Error,
     },
+    /// A lock that others hold for moments only, while they open or leave a channel, stays taken.
+    #[error(
+        "{path}: another process holds this lock for more than {waited_s} s, where milliseconds are usual: it \
+         was stopped while it opened a channel; `fuser {path}` names it, continue or end it"
+    )]
+    Locked {
+        /// The locked file or directory.
+        path: PathBuf,
+        /// Seconds waited.
+        waited_s: u64,
+    },
     /// The process has as many open files as it may.
     #[error(
         "open files: the limit{} is reached, nothing more can be opened or connected; raise it by \

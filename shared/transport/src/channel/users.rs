@@ -10,7 +10,7 @@
 use std::fs::{OpenOptions, Permissions, TryLockError};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use iceoryx2::node::NodeState;
 use iceoryx2::prelude::{CallbackProgression, Node, ipc};
@@ -32,9 +32,12 @@ const SEGMENT_IN_MAKING: u32 = 0o200;
 /// Memory that a few ports take with their services and connections, with a margin.
 const FREE_BYTES_MIN: u64 = 4 << 20;
 const FREE_FILES_MIN: u64 = 32;
-/// The last one to leave tidies up within microseconds; a newcomer waits for it.
-const TRIES: u32 = 250;
-const PAUSE: Duration = Duration::from_millis(4);
+/// Longest wait for a lock, and the pause between two tries: a daemon of many trains, which makes hundreds of ports one
+/// after another, lets others in between.
+const LOCK_TIME: Duration = Duration::from_secs(5);
+const PAUSE: Duration = Duration::from_millis(2);
+/// Time after which who makes or removes something is done with it, or dead.
+const MADE_TIME: Duration = Duration::from_millis(20);
 
 /// A user of the transport, until dropped.
 #[derive(Debug)]
@@ -62,7 +65,7 @@ impl Users {
             users.remove_all();
         }
         // An exclusive lock becomes a shared one; another newcomer may come between, and finds nothing.
-        wait_for(|| users.lock.try_lock_shared()).map_err(unusable(host.root(), "locking"))?;
+        wait_for(host.root(), || users.lock.try_lock_shared())?;
         Ok(users)
     }
 
@@ -75,7 +78,7 @@ impl Users {
     pub fn begin_making(&self) -> Result<LockedFile, ChannelError> {
         let file = open_private(&self.making).map_err(unusable(&self.making, "opening"))?;
         let file = LockedFile::new(file);
-        wait_for(|| file.try_lock()).map_err(unusable(&self.making, "locking"))?;
+        wait_for(&self.making, || file.try_lock())?;
         self.remove_half_made();
         Ok(file)
     }
@@ -120,7 +123,7 @@ impl Users {
         };
         let first = half_made();
         if !first.is_empty() {
-            std::thread::sleep(5 * PAUSE);
+            std::thread::sleep(MADE_TIME);
             for file in half_made().iter().filter(|it| first.contains(it)) {
                 let _ = std::fs::remove_file(file);
             }
@@ -217,16 +220,22 @@ fn files_of(directory: &Path) -> Vec<PathBuf> {
     entries.filter_map(|entry| Some(entry.ok()?.path())).collect()
 }
 
-/// Takes a lock that others hold for moments only.
-fn wait_for(lock: impl Fn() -> Result<(), TryLockError>) -> std::io::Result<()> {
-    for _ in 0..TRIES {
+/// Takes the lock of a file, or directory, that others hold for moments only.
+fn wait_for(path: &Path, lock: impl Fn() -> Result<(), TryLockError>) -> Result<(), ChannelError> {
+    let start = Instant::now();
+    loop {
         match lock() {
             Ok(()) => return Ok(()),
-            Err(TryLockError::WouldBlock) => std::thread::sleep(PAUSE),
-            Err(TryLockError::Error(source)) => return Err(source),
+            Err(TryLockError::Error(source)) => return Err(unusable(path, "locking")(source)),
+            Err(TryLockError::WouldBlock) if start.elapsed() < LOCK_TIME => {
+                std::thread::sleep(PAUSE);
+            }
+            Err(TryLockError::WouldBlock) => {
+                let waited_s = LOCK_TIME.as_secs();
+                return Err(ChannelError::Locked { path: path.into(), waited_s });
+            }
         }
     }
-    Err(std::io::ErrorKind::TimedOut.into())
 }
 
 /// Returns the refusal where shared memory is full.
