@@ -2,9 +2,9 @@
 //! the explanation with it.
 
 use dynocar_analysis::dataset::{Dataset, ForceSource};
-use dynocar_analysis::explain::drive_efficiency::{self, EstimatedDrive};
 use dynocar_analysis::explain::evidence::{Density, FitProblem};
 use dynocar_analysis::explain::explain;
+use dynocar_analysis::explain::found_forces::{self, EstimatedDrive};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::read_files;
 use dynocar_tests::simulator::power::{TrueDrive, power_files};
@@ -38,7 +38,7 @@ fn dataset(seed: u64, drive: &TrueDrive, effects: EffectRequest) -> Dataset {
 /// The drive as the fit runs of a dataset show it.
 fn estimated(dataset: &Dataset) -> Option<EstimatedDrive> {
     let (problem, _) = FitProblem::of(dataset, Density::Recorded).expect("usable runs");
-    drive_efficiency::estimated(&problem, dataset.train.drive)
+    found_forces::estimated_drive(&problem, dataset.train.drive)
 }
 
 /// The drive of a seed: from 0.76 to 0.95, with auxiliaries of 40 to 100 kW on every other line.

@@ -125,6 +125,7 @@ fn what_a_killed_maker_left_incomplete_is_removed_before_the_next_port_is_made()
         path
     };
     let (incomplete, complete) = (leave("incomplete", 0o200), leave("complete", 0o600));
+    std::fs::write(bench.host.root().join("services.lock"), [0]).unwrap();
     let _sender = bench.transport.sender::<TrainSample>(TRAIN).unwrap();
     assert_eq!(segments(&bench.host, ".connection"), [complete], "{incomplete:?} is still there");
 }

@@ -4,8 +4,8 @@
 //! # Layout, in the order of the work
 //!
 //! - [`evidence`]: observations, noise, the joint fit of a, b, c and effects
-//! - [`drive_efficiency`]: the efficiency of a drive whose recording has its power and not its force
-//! - [`force_time`]: forces that act before their time stamps
+//! - [`found_forces`]: the efficiency of a drive whose recording has its power and not its force, and forces that act
+//!   before their time stamps
 //! - [`hypothesis`], [`effects`]: the interface of an effect; the library, one file for each kind
 //! - [`scan`], [`places`]: the gain of a force of a given shape, and the interval, runs or window of time where it acts
 //! - [`selection`]: the search for effects, their significance, the evidence of each run, and the finished model fitted
@@ -22,10 +22,9 @@ pub mod answer;
 pub mod caveats;
 pub mod competing;
 pub mod course;
-pub mod drive_efficiency;
 pub mod effects;
 pub mod evidence;
-pub mod force_time;
+pub mod found_forces;
 pub mod held_out;
 pub mod hypothesis;
 mod location;
@@ -47,9 +46,9 @@ use dynocar_core::plausibility::Severity;
 use crate::dataset::Dataset;
 use crate::dataset::dataset_diagnostic::diagnostics;
 use crate::parallel;
-use answer::{ExplainAnswer, WithStd};
-use drive_efficiency::EstimatedDrive;
+use answer::ExplainAnswer;
 use evidence::{Density, FitProblem, RunData, RunDataError};
+use found_forces::{EstimatedDrive, FoundForces};
 use held_out::HeldOutRun;
 use many::{Held, Many, Preparation};
 use score::PredictionScore;
@@ -187,26 +186,6 @@ fn judged<E: From<RunDataError> + Send>(
     }
 }
 
-/// Corrections of the forces that were found before the search.
-struct FoundForces {
-    estimated_drive: Option<EstimatedDrive>,
-    late: Option<WithStd>,
-}
-
-impl FoundForces {
-    /// States them in an answer.
-    fn add_to(self, answer: &mut ExplainAnswer) {
-        if let Some(estimated) = self.estimated_drive {
-            answer.add_caveat(&estimated.answer.sentence());
-            answer.drive = Some(estimated.answer);
-        }
-        if let Some(late) = self.late {
-            answer.add_caveat(&force_time::sentence(late));
-            answer.force_late_s = Some(late);
-        }
-    }
-}
-
 /// Prepared runs, with the corrections of their forces that were found.
 struct Prepared {
     forces: FoundForces,
@@ -219,17 +198,18 @@ impl Prepared {
     /// Makes the runs of a dataset ready: once, and once more for each correction of their forces that is found.
     fn new(declared: &Dataset, density: Density) -> Result<Self, RunDataError> {
         let step_s = declared.step_s();
-        let is_time_open = force_time::is_sought(step_s);
+        let is_time_open = found_forces::is_time_sought(step_s);
         let has_power = declared.runs.iter().any(|run| run.power().is_some());
         let first = if is_time_open || has_power { Density::Recorded } else { density };
         let (mut problem, mut holdout) = FitProblem::of(declared, first)?;
         let mut dataset = Cow::Borrowed(declared);
-        let estimated_drive = drive_efficiency::estimated(&problem, declared.train.drive);
+        let estimated_drive = found_forces::estimated_drive(&problem, declared.train.drive);
         if let Some(EstimatedDrive { drive, .. }) = &estimated_drive {
             dataset = Cow::Owned(dataset.with_drive(*drive));
             (problem, holdout) = FitProblem::of(&dataset, Density::Recorded)?;
         }
-        let late = if is_time_open { force_time::estimated(&problem, step_s) } else { None };
+        let late =
+            if is_time_open { found_forces::estimated_lateness(&problem, step_s) } else { None };
         if let Some(late) = late {
             dataset = Cow::Owned(dataset.with_forces_moved(late.value));
         }
@@ -239,7 +219,7 @@ impl Prepared {
         let drive = estimated_drive.as_ref().map(|it| it.drive);
         let preparation = Preparation::new(declared, drive, late.map(|late| late.value));
         Ok(Prepared {
-            forces: FoundForces { estimated_drive, late },
+            forces: FoundForces { drive: estimated_drive, late },
             preparation,
             problem,
             holdout,

@@ -18,8 +18,8 @@ use iceoryx2::service::builder::publish_subscribe::{
 };
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
-use super::process::{LockedFile, Owned};
-use super::users::Users;
+use super::process::Owned;
+use super::users::{Making, Users};
 use crate::error::ChannelError;
 
 /// Longest wait for a service that another process is making or destroying.
@@ -40,13 +40,14 @@ impl Entrance {
     pub(super) fn service<T: Payload>(
         &self,
         train: TrainId,
-    ) -> Result<(PortFactory<ipc::Service, Wire<T>, ()>, LockedFile), ChannelError> {
+    ) -> Result<(PortFactory<ipc::Service, Wire<T>, ()>, Making), ChannelError> {
         let text = service_name::<T>(train);
         let refused = |reason: String| ChannelError::transport(format!("service {text}"), reason);
         let name = ServiceName::new(&text).map_err(|error| refused(format!("{error:?}")))?;
         let start = Instant::now();
+        let mut is_refused = false;
         loop {
-            let making = self.users.begin_making()?;
+            let making = self.users.begin_making(is_refused)?;
             let result = self
                 .node
                 .get()
@@ -64,6 +65,7 @@ impl Entrance {
                 Ok(service) => return Ok((service, making)),
                 Err(error) if is_settling(&error) && start.elapsed() < SETTLING_TIME => {
                     drop(making);
+                    is_refused = true;
                     std::thread::sleep(Duration::from_millis(2));
                 }
                 Err(PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(

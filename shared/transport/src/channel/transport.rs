@@ -40,7 +40,7 @@ impl Transport {
         let users = Users::enter(host)?;
         users.require_free_memory()?;
         let name = NodeName::new(name).map_err(|error| refused(format!("{error:?}")))?;
-        let making = users.begin_making()?;
+        let making = users.begin_making(false)?;
         let node = NodeBuilder::new()
             .name(&name)
             .config(&host.transport_config()?)

@@ -10,6 +10,8 @@
 use std::fs::{OpenOptions, Permissions, TryLockError};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+use std::sync::atomic::Ordering::Relaxed;
 use std::time::{Duration, Instant};
 
 use iceoryx2::node::NodeState;
@@ -24,6 +26,8 @@ use crate::host::{Host, open_private, unusable};
 
 /// Ending of the segment's name.
 const SUFFIX: &str = ".global_mgmt";
+/// Ending of the names of the segments between a sender and a receiver.
+const CONNECTION_SUFFIX: &str = ".connection";
 /// Ending of the names of the pages that count samples, see [`super::SampleCount`].
 pub const COUNT_SUFFIX: &str = ".count";
 /// The modes of a service's description and of a segment that are not complete: the transport's.
@@ -46,6 +50,20 @@ pub struct Users {
     making: PathBuf,
     host: Host,
     segment_prefix: String,
+    has_made: AtomicBool,
+}
+
+/// The making of something, until dropped. The file is empty while nothing is being made.
+#[derive(Debug)]
+pub struct Making(LockedFile);
+
+impl Drop for Making {
+    fn drop(&mut self) {
+        if let Some(file) = self.0.own() {
+            // Otherwise the next one looks for what was left incomplete, and finds nothing.
+            let _ = file.set_len(0);
+        }
+    }
 }
 
 impl Users {
@@ -60,6 +78,7 @@ impl Users {
             making: host.root().join("services.lock"),
             host: host.clone(),
             segment_prefix: host.segment_prefix(),
+            has_made: AtomicBool::new(false),
         };
         if users.lock.try_lock().is_ok() && !users.has_strangers() {
             users.remove_all();
@@ -69,23 +88,30 @@ impl Users {
         Ok(users)
     }
 
-    /// Begins the making of nodes, services or ports, one process at a time, after removing those that a killed process
-    /// left incomplete; ends when the file is dropped.
+    /// Begins the making of a node, a service or a port, which one process does at a time.
+    ///
+    /// Removes what processes that were killed left incomplete: where the one before was killed at it, at the first call,
+    /// and where the transport has refused something (`is_refused`), since leaving removes services too.
     ///
     /// # Errors
     ///
     /// When the lock cannot be had.
-    pub fn begin_making(&self) -> Result<LockedFile, ChannelError> {
+    pub fn begin_making(&self, is_refused: bool) -> Result<Making, ChannelError> {
         let file = open_private(&self.making).map_err(unusable(&self.making, "opening"))?;
         let file = LockedFile::new(file);
         wait_for(&self.making, || file.try_lock())?;
-        self.remove_half_made();
-        Ok(file)
+        let marked = file.metadata().and_then(|it| file.set_len(1).map(|()| it.len() > 0));
+        let was_killed = marked.map_err(unusable(&self.making, "marking"))?;
+        let is_first = !self.has_made.swap(true, Relaxed);
+        if is_first || is_refused || was_killed {
+            self.remove_half_made();
+        }
+        Ok(Making(file))
     }
 
     /// Removes the files of dead processes, where no process lives; the count of samples stays.
     fn remove_all(&self) {
-        for segment in self.segments("") {
+        for segment in self.segments(&[""]) {
             if segment.to_string_lossy().ends_with(COUNT_SUFFIX) {
                 continue;
             }
@@ -115,10 +141,13 @@ impl Users {
     /// in a moment.
     fn remove_half_made(&self) {
         let half_made = || {
-            let segments = self.segments("");
             let mut found = files_of(&self.host.transport_directory().join("services"));
-            found.retain(|it| !is_complete(it, &segments));
-            found.extend(segments.into_iter().filter(|it| is_in_making(it)));
+            if !found.is_empty() {
+                let segments = self.segments(&[".dynamic"]);
+                found.retain(|it| !is_complete(it, &segments));
+            }
+            let awaited = self.segments(&[SUFFIX, CONNECTION_SUFFIX]).into_iter();
+            found.extend(awaited.filter(|it| is_in_making(it)));
             found
         };
         let first = half_made();
@@ -160,7 +189,7 @@ impl Users {
     ///
     /// [`ChannelError::SharedMemoryFull`].
     pub fn reserve(&self) -> Result<(), ChannelError> {
-        for path in self.segments("") {
+        for path in self.segments(&[""]) {
             // One that is gone, or that its maker has not opened yet, is not ours to reserve.
             let Ok(file) = OpenOptions::new().read(true).write(true).open(path) else { continue };
             let length = file.metadata().map_or(0, |it| it.len());
@@ -177,19 +206,24 @@ impl Users {
 
     /// Closes the segment to other users; the transport opens it to all.
     pub fn close_to_others(&self) {
-        for segment in self.segments(SUFFIX) {
+        for segment in self.segments(&[SUFFIX]) {
             // One that belongs to somebody else, or is gone, cannot be closed; a node of ours
             // that could not use it would have said so.
             let _ = std::fs::set_permissions(segment, Permissions::from_mode(0o600));
         }
     }
 
-    fn segments(&self, suffix: &str) -> Vec<PathBuf> {
-        let is_ours = |name: &str| name.starts_with(&self.segment_prefix) && name.ends_with(suffix);
-        let mut segments = files_of(Path::new(SHARED_MEMORY));
-        segments
-            .retain(|path| path.file_name().and_then(|name| name.to_str()).is_some_and(is_ours));
-        segments
+    /// Returns the segments whose names end in one of some ways.
+    fn segments(&self, suffixes: &[&str]) -> Vec<PathBuf> {
+        let is_ours = |name: &str| {
+            name.starts_with(&self.segment_prefix)
+                && suffixes.iter().any(|suffix| name.ends_with(suffix))
+        };
+        let entries = std::fs::read_dir(SHARED_MEMORY).into_iter().flatten().flatten();
+        entries
+            .filter(|it| it.file_name().to_str().is_some_and(is_ours))
+            .map(|it| it.path())
+            .collect()
     }
 }
 
@@ -251,7 +285,7 @@ impl Drop for Users {
     fn drop(&mut self) {
         if self.lock.own().is_some_and(|lock| lock.try_lock().is_ok()) && !self.has_strangers() {
             self.remove_all();
-            for segment in self.segments(COUNT_SUFFIX) {
+            for segment in self.segments(&[COUNT_SUFFIX]) {
                 let _ = std::fs::remove_file(segment);
             }
         }

@@ -33,7 +33,7 @@ fn wake_service(transport: &Transport) -> Result<PortFactory<ipc::Service>, Chan
     let refused =
         |reason: String| ChannelError::transport(format!("service {WAKE_SERVICE}"), reason);
     let name = ServiceName::new(WAKE_SERVICE).map_err(|error| refused(format!("{error:?}")))?;
-    let _making = transport.users().begin_making()?;
+    let _making = transport.users().begin_making(false)?;
     transport
         .node()
         .service_builder(&name)

@@ -6,7 +6,7 @@ use dynocar::dataset;
 use dynocar_analysis::dataset::{Dataset, Role};
 use dynocar_analysis::explain::answer::WithStd;
 use dynocar_analysis::explain::evidence::{Density, FitProblem};
-use dynocar_analysis::explain::{drive_efficiency, explain};
+use dynocar_analysis::explain::{explain, found_forces};
 use dynocar_model::train::PowerTrain;
 use dynocar_shared::SampleField;
 use dynocar_workshop::survey::survey_folder;
@@ -130,7 +130,7 @@ pub fn by_power(surveyed: &Path) -> Result<ByPower, String> {
     let (problem, _) =
         FitProblem::of(&powered, Density::Recorded).map_err(|error| error.to_string())?;
     let declared = powered.train.drive;
-    let estimated = drive_efficiency::estimated(&problem, declared).ok_or("no power")?;
+    let estimated = found_forces::estimated_drive(&problem, declared).ok_or("no power")?;
     let apart = apart(&recorded, &powered.with_drive(estimated.drive))?;
     let error_mps = held_out_mps(&powered)?;
     let auxiliaries_kw = estimated.answer.auxiliary_power_kw.ok_or("no auxiliaries")?;

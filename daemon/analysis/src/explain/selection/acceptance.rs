@@ -3,7 +3,7 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::by_run::{deviations, scatter_factor};
+use super::deviations::{deviations, scatter_factor};
 use super::outcome::{EffectTrial, Refusal, SearchOutcome, at_bound, penalty};
 use super::search::Search;
 use crate::explain::effects::{Certainty, SharedHypothesis, policy_of};

@@ -1,8 +1,7 @@
 //! The search for effects.
 
 mod acceptance;
-mod by_run;
-mod davis_form;
+mod deviations;
 mod nuisance;
 mod outcome;
 mod outside;
@@ -13,8 +12,8 @@ mod sources;
 mod trying;
 
 pub use acceptance::deciding_score;
-pub use by_run::{
-    Deviations, FORM_SHARE, deviations, deviations_with_nuisance, enlarged_by_scatter,
+pub use deviations::{
+    Deviations, EFFECT_FORM_SHARE, deviations, deviations_with_nuisance, enlarged_by_scatter,
     few_runs_factor, std_with_forms, without_each_run,
 };
 pub use nuisance::{deviations_given, is_certain_with_nuisance, move_to_nuisance_fit};

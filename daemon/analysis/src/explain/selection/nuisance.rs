@@ -13,8 +13,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use super::acceptance::{
     CERTAIN_RUNS_MIN, is_certain, is_left_by_moved_places, is_material, is_possible, moves_places,
 };
-use super::by_run::{Deviations, deviations, deviations_with_nuisance};
-use super::davis_form::davis_form_std;
+use super::deviations::{Deviations, davis_form_std, deviations, deviations_with_nuisance};
 use super::outcome::{
     EffectTrial, NuisanceFit, Refusal, SearchOutcome, at_bound, penalty, round_of,
 };

@@ -6,7 +6,7 @@ use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{Cholesky, DMatrix};
 
-use super::by_run::deviations_with_nuisance;
+use super::deviations::deviations_with_nuisance;
 use crate::explain::effects::{AtBound, SharedHypothesis};
 use crate::explain::evidence::{Fit, acceptance_score};
 use crate::statistics::rms;

@@ -1,8 +1,12 @@
-//! Efficiency of a drive whose recording has its power and not its force: a scale that the runs determine through the
-//! mass, estimated before the search for undeclared effects.
+//! Corrections of the recorded forces, which are estimated before the search for undeclared effects.
 //!
-//! The efficiency acts one way when the drive pulls and the other way when it brakes, and so do the auxiliaries: their
+//! The efficiency of a drive whose recording has its power and not its force is a scale that the runs determine through
+//! the mass. It acts one way when the drive pulls and the other way when it brakes, and so do the auxiliaries: their
 //! estimates hold for the declared mass.
+//!
+//! A recorder that averages over the second before its time stamp, or stamps late, holds forces that act before their
+//! stamps; in recordings with one sample per second this costs as much error as all other causes together. A force that
+//! acts after its stamp is an actuator's delay, for which the search looks.
 
 use std::sync::Arc;
 
@@ -12,14 +16,15 @@ use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;
 
-use super::answer::{DriveAnswer, WithStd};
+use super::answer::{DriveAnswer, ExplainAnswer, WithStd};
 use super::effects::{AtBound, Hypothesis, Nature, On};
 use super::evidence::{FitProblem, RunData, SampleForces, UpdatedModel};
-use super::selection::{FORM_SHARE, OBSERVATIONS_MIN, deviations};
+use super::selection::{EFFECT_FORM_SHARE, OBSERVATIONS_MIN, deviations};
+use crate::dataset::{is_stamped_late, stamped_late};
 use crate::statistics::{rms, share_of};
 
 /// Efficiency, and the power in kW that auxiliaries take while the train drives, above their power at rest.
-const PARAMETERS: [Parameter; 2] = [
+const DRIVE: [Parameter; 2] = [
     Parameter::new(
         "efficiency",
         (*PowerTrain::EFFICIENCIES.start(), *PowerTrain::EFFICIENCIES.end()),
@@ -53,7 +58,7 @@ impl Auxiliaries {
             .collect();
         if resting_kw.len() < RESTING_MIN {
             let power_kw = 1e-3 * declared.auxiliary_power_w;
-            return Auxiliaries { power_kw, std_kw: PARAMETERS[1].upper };
+            return Auxiliaries { power_kw, std_kw: DRIVE[1].upper };
         }
         let at = |share: f64| share_of(&resting_kw, share);
         let power_kw = at(0.5).max(0.0);
@@ -109,7 +114,7 @@ impl OpenDrive {
 
 impl Hypothesis for OpenDrive {
     fn nature(&self) -> Nature<'_> {
-        let parameters = if self.resting.is_some() { &PARAMETERS[..] } else { &PARAMETERS[..1] };
+        let parameters = if self.resting.is_some() { &DRIVE[..] } else { &DRIVE[..1] };
         Nature {
             // A drive without losses.
             none: 1.0,
@@ -121,7 +126,7 @@ impl Hypothesis for OpenDrive {
     }
 
     fn at_bound(&self, parameters: &[f64]) -> Option<AtBound> {
-        let spec = &PARAMETERS[0];
+        let spec = &DRIVE[0];
         // The upper bound is a drive without losses: power that is recorded at the wheels.
         let is_low = parameters[0] - spec.lower < spec.step;
         is_low.then_some(AtBound { name: spec.name, bound: spec.lower })
@@ -157,7 +162,10 @@ pub struct EstimatedDrive {
 
 /// Returns the efficiency of a train's drive, which may be declared, as estimated from runs that record its power;
 /// `None` where no force comes from power, or too little is driven to estimate it.
-pub fn estimated(problem: &FitProblem, declared: Option<PowerTrain>) -> Option<EstimatedDrive> {
+pub fn estimated_drive(
+    problem: &FitProblem,
+    declared: Option<PowerTrain>,
+) -> Option<EstimatedDrive> {
     let powered: Vec<&RunData> = problem.runs.iter().filter(|run| run.power.is_some()).collect();
     if powered.is_empty() {
         return None;
@@ -179,7 +187,7 @@ pub fn estimated(problem: &FitProblem, declared: Option<PowerTrain>) -> Option<E
     let answer = DriveAnswer {
         efficiency: WithStd {
             value: at.efficiency,
-            std: deviation[3].hypot(FORM_SHARE * at.efficiency),
+            std: deviation[3].hypot(EFFECT_FORM_SHARE * at.efficiency),
         },
         auxiliary_power_kw: open.resting.map(|_| WithStd {
             value: 1e-3 * at.auxiliary_power_w,
@@ -219,5 +227,83 @@ impl DriveAnswer {
              for the declared mass: of a mass that is 1 % off, so is the efficiency.",
             HALF_95 * std
         )
+    }
+}
+
+/// Where the samples are nearer in time than this in s, a late stamp is left to each run's own small delay.
+const STEP_MIN_S: f64 = 0.5;
+/// A lateness below this share of the step between samples is left to it as well.
+const LATE_SHARE_MIN: f64 = 0.1;
+
+/// Time in s by which forces act before their stamps.
+const LATENESS: [Parameter; 1] = [Parameter::new("force_late_s", (-1.0, 1.0), 0.02)];
+
+/// Forces that act before their stamps (after them, where negative), along straight lines between
+/// the samples.
+#[derive(Debug)]
+struct LateStamps;
+
+impl Hypothesis for LateStamps {
+    fn nature(&self) -> Nature<'_> {
+        Nature::new(EffectKind::ActuatorDelay, &LATENESS)
+    }
+
+    /// No other effect acts before this one: the forces around a sample are the declared ones.
+    fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
+        let (late_s, time_s) = (parameters[0], run.recording.time_s());
+        for (i, force) in (first..).zip(forces) {
+            let other = if late_s >= 0.0 { i + 1 } else { i.wrapping_sub(1) };
+            let Some(ahead) = run.declared.get(other) else { continue };
+            let step_s = (time_s[other] - time_s[i]).abs();
+            let at = |own, ahead| stamped_late(own, ahead, step_s, late_s.abs());
+            force.traction_n = at(force.traction_n, ahead.traction_n);
+            force.brake_n = at(force.brake_n, ahead.brake_n);
+        }
+    }
+}
+
+/// Returns whether samples `step_s` apart leave the time of the forces open.
+pub fn is_time_sought(step_s: f64) -> bool {
+    step_s >= STEP_MIN_S
+}
+
+/// Returns by how many s runs with samples `step_s` apart stamp forces late; `None` where the forces act after their
+/// stamps, or where it is not identifiable.
+pub fn estimated_lateness(problem: &FitProblem, step_s: f64) -> Option<WithStd> {
+    let model = UpdatedModel::default().with(Arc::new(LateStamps));
+    let fit = problem.fit_from_declared(&model, &[0.0]);
+    if fit.observations() < OBSERVATIONS_MIN {
+        return None;
+    }
+    let deviation = deviations(&fit).std;
+    let late = WithStd { value: fit.effect_parameters(0)[0], std: deviation[3] };
+    let is_inside = LateStamps.at_bound(&[late.value]).is_none();
+    let counts = late.value > LATE_SHARE_MIN * step_s && is_inside;
+    (counts && is_stamped_late(late.value, late.std)).then_some(late)
+}
+
+/// Corrections of the forces that were found before the search.
+pub struct FoundForces {
+    /// The drive, where its power is recorded.
+    pub drive: Option<EstimatedDrive>,
+    /// Time in s by which the forces act before their stamps.
+    pub late: Option<WithStd>,
+}
+
+impl FoundForces {
+    /// States them in an answer.
+    pub fn add_to(self, answer: &mut ExplainAnswer) {
+        if let Some(estimated) = self.drive {
+            answer.add_caveat(&estimated.answer.sentence());
+            answer.drive = Some(estimated.answer);
+        }
+        if let Some(late) = self.late {
+            answer.add_caveat(&format!(
+                " Forces act {:.2} ± {:.2} s before their stamps and were taken where they act.",
+                late.value,
+                HALF_95 * late.std
+            ));
+            answer.force_late_s = Some(late);
+        }
     }
 }
