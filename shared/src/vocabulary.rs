@@ -295,6 +295,13 @@ impl Reason {
                 | Reason::ImplausiblePressure
         )
     }
+
+    /// Returns whether the samples have to change before anything can be learned from them: they cannot be true, are
+    /// refused or lack a quantity.
+    pub const fn is_of_input(self) -> bool {
+        self.is_implausible_input()
+            || matches!(self, Reason::BadInput | Reason::MissingQuantity | Reason::GradientUnknown)
+    }
 }
 
 impl Manoeuvre {

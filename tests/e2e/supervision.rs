@@ -136,6 +136,28 @@ fn health_without_options_lists_every_train_and_ends_with_the_worst_verdict() {
 }
 
 #[test]
+fn health_names_the_remedy_where_every_sample_is_refused() {
+    let site = DaemonSite::new();
+    let daemon = daemon(&site, "[[pipelines]]\nkind = \"train_kalman\"\n", &[]);
+    let mut publisher = SamplePublisher::open(&site.host(), TRAIN).unwrap();
+    let mut sample = TrainSample::empty(TRAIN).with(SampleField::Speed, f64::NAN);
+    let mut words = String::new();
+    await_true(
+        || {
+            for _ in 0..300 {
+                sample.time_ns += 100_000_000;
+                publisher.publish(&mut sample).expect("a sample to be taken");
+            }
+            let code;
+            (code, words) = health(&site);
+            code == Some(3) && words.contains("to do: leave the bit out")
+        },
+        || format!("a verdict on refused samples: {}", daemon.errors()),
+    );
+    assert!(words.contains("(bad_input): it ends with its reason"), "{words}");
+}
+
+#[test]
 fn health_shows_a_degraded_pipeline_and_an_incompatible_daemon() {
     let site = DaemonSite::new();
     let host = site.host();

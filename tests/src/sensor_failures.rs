@@ -1,6 +1,6 @@
 //! Failures of sensors and channels, applied to good samples.
 
-use dynocar_model::simulate::elements::quantised;
+use dynocar_model::simulate::motion::quantised;
 use dynocar_shared::{SampleField, TrainSample};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,8 +1,8 @@
 //! Samples of a tram from stop to stop: an electric brake with a limited change of force, then a friction brake that
 //! follows its report late.
 
-use dynocar_model::simulate::elements::{lagged_explicitly, shown};
 use dynocar_model::simulate::motion::deceleration_mps2;
+use dynocar_model::simulate::motion::{lagged_explicitly, shown};
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 

@@ -6,7 +6,7 @@
 //! computed for the place and speed at which it will act. When the parameters change, the estimate changes with them,
 //! so that the force does not jump.
 
-use dynocar_model::simulate::elements::slewed;
+use dynocar_model::simulate::motion::slewed;
 
 use super::knowledge::{Ability, Knowledge};
 use super::plan::{BrakingCurve, COASTING_MIN_SHARE, DrivePlan, PlannedLeg, Planner};

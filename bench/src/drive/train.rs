@@ -2,7 +2,7 @@
 //! parameters.
 
 use dynocar_core::pipeline::braking::intake::DeclaredGear;
-use dynocar_model::simulate::elements::{DeadTime, shown};
+use dynocar_model::simulate::motion::{DeadTime, shown};
 use dynocar_model::simulate::motion::{SimulatedMotion, advance};
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use dynocar_model::simulate::elements::lagged_explicitly;
+use dynocar_model::simulate::motion::lagged_explicitly;
 
 /// Report of the brake by the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! Driving from stop to stop, and the samples that the controller writes.
 
-use dynocar_model::simulate::elements::{DeadTime, shown, slewed};
 use dynocar_model::simulate::motion::deceleration_mps2;
+use dynocar_model::simulate::motion::{DeadTime, shown, slewed};
 use dynocar_model::train::Davis;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 

@@ -7,6 +7,8 @@ use super::order::quantile;
 const HOUR_S: f64 = 3600.0;
 /// Greatest change in m/s of a moving train's speed over a step, in addition to that by its acceleration.
 const SPEED_STEP_MPS: f64 = 1.0;
+/// Speed in m/s above which a train moves, by the coarsest sensor.
+const CREEPING_MPS: f64 = 0.3;
 /// Sharpest acceleration in m/s².
 const ACCELERATION_MPS2: f64 = 3.0;
 /// Share of rows with the time of the row before above which times have no fraction.
@@ -77,7 +79,7 @@ fn set_back(times_s: &mut [f64], speed_mps: &[f64], step_s: f64) -> Vec<(usize, 
         let (from, to) = (speed_mps[row - 1], speed_mps[row]);
         let goes_on = (to - from).abs() <= SPEED_STEP_MPS + ACCELERATION_MPS2 * step_s;
         // A train that stands for an hour does so.
-        let is_moving = ahead_s < 0.0 || from.min(to) > SPEED_STEP_MPS;
+        let is_moving = ahead_s < 0.0 || from.min(to) > CREEPING_MPS;
         if is_hour && goes_on && is_moving {
             jumps.push((row, hour_s));
             shift_s -= hour_s;
@@ -182,9 +184,11 @@ mod tests {
                 .enumerate()
                 .map(|(row, it)| it + if row < 150 { 0.0 } else { hour_s })
                 .collect();
-            let (found, faults, order) = mended(&put, &[20.0; 400]);
-            assert_eq!((faults.jumps, order), (vec![(150, hour_s)], None));
-            assert!(are_equal(&found, &times));
+            for speed_mps in [20.0, 0.7] {
+                let (found, faults, order) = mended(&put, &[speed_mps; 400]);
+                assert_eq!((faults.jumps, order), (vec![(150, hour_s)], None), "{speed_mps} m/s");
+                assert!(are_equal(&found, &times));
+            }
         }
         let stood: Vec<f64> = times
             .iter()

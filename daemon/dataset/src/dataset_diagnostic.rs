@@ -39,6 +39,13 @@ impl std::fmt::Display for DatasetDiagnostic {
     }
 }
 
+impl DatasetDiagnostic {
+    /// Returns the diagnostic with a word for how much it matters.
+    pub fn labelled(&self) -> String {
+        format!("{}: {self}", self.severity.label())
+    }
+}
+
 impl Dataset {
     /// Returns the diagnostics that may spoil results from these runs, the worst first.
     pub fn diagnostics(&self) -> Vec<DatasetDiagnostic> {
@@ -133,6 +140,8 @@ const MASS_PER_LENGTH_T_PER_M: (f64, f64) = (0.1, 20.0);
 /// Lengths in m of a vehicle or a train; 1 m stands for a train taken as a point.
 const LENGTH_M: (f64, f64) = (1.0, 8000.0);
 const POINT_LENGTH_M: f64 = 1.0;
+/// Greatest extent of a line's places, in lengths of it: a survey may reach beyond its ends.
+const LINE_LENGTHS_MAX: f64 = 2.0;
 /// Greatest accelerations in m/s² by the effort curves.
 const EFFORT_MPS2: (f64, f64) = (0.01, 10.0);
 /// Basic resistances in N/kN at any speed.
@@ -196,26 +205,47 @@ pub fn misdeclared(train: &TrainModel, track: Option<&Track>) -> Vec<Diagnostic>
         let text = format!("the resistance is {text}");
         found.push(Diagnostic::new("unusual_resistance", Severity::Warning, text, []));
     }
-    let line_m = track.and_then(|track| track.length_m);
-    say(
-        &mut found,
-        line_m.is_some_and(|line_m| line_m < length_m),
-        "line_length",
-        format!(
-            "a line of {} m is shorter than the train: is length_m in m?",
-            line_m.unwrap_or(0.0)
-        ),
-    );
+    found.extend(track.and_then(|track| of_line(train, track)));
     found
+}
+
+/// Returns the diagnostic of a line that cannot be as long as declared.
+fn of_line(train: &TrainModel, track: &Track) -> Option<Diagnostic> {
+    let line_m = track.length_m?;
+    let text = match chainages_m(track) {
+        _ if line_m < train.length_m => {
+            format!("a line of {line_m} m is shorter than the train: is length_m in m?")
+        }
+        Some((from_m, to_m)) if to_m - from_m > LINE_LENGTHS_MAX * line_m => format!(
+            "a line of {line_m} m has gradients, curves or tunnels from {from_m} m to {to_m} m: are all in m?"
+        ),
+        _ => return None,
+    };
+    Some(Diagnostic::new("line_length", Severity::Fundamental, text, []))
+}
+
+/// Returns the least and the greatest chainage in m of a line's gradients, curves and tunnels; `None` without any.
+fn chainages_m(track: &Track) -> Option<(f64, f64)> {
+    let gradients = track.gradient().into_iter().flat_map(|it| it.entries().map(|entry| entry.0));
+    let curves = track.curves().iter().flat_map(|it| [it.start_m, it.end_m]);
+    let tunnels = track.tunnels().iter().flat_map(|it| [it.start_m, it.end_m]);
+    let all: Vec<f64> = gradients.chain(curves).chain(tunnels).collect();
+    all.iter().copied().reduce(f64::min).zip(all.iter().copied().reduce(f64::max))
 }
 
 #[cfg(test)]
 mod tests {
     use dynocar_model::train::{BrakeGear, Davis, EffortCurve};
 
+    use crate::parse_track;
+
     use super::*;
 
     fn codes(change: impl Fn(&mut TrainModel)) -> Vec<&'static str> {
+        codes_on(None, change)
+    }
+
+    fn codes_on(line: Option<Track>, change: impl Fn(&mut TrainModel)) -> Vec<&'static str> {
         let mut train = TrainModel {
             name: String::new(),
             mass_kg: 200e3,
@@ -235,7 +265,21 @@ mod tests {
             extra: Vec::new(),
         };
         change(&mut train);
-        misdeclared(&train, None).into_iter().map(|it| it.code).collect()
+        misdeclared(&train, line.as_ref()).into_iter().map(|it| it.code).collect()
+    }
+
+    #[test]
+    fn a_line_much_shorter_than_its_gradients_or_tunnels_is_reported() {
+        let line = |text: &str| Some(parse_track("track.toml", text).unwrap());
+        let none: [&str; 0] = [];
+        let usual = "[track]\nname='l'\nlength_m=12000\ngradient=[[500000,1.0],[513000,0.0]]";
+        assert_eq!(codes_on(line(usual), |_| {}), none, "chainages need not begin at 0");
+        for places in
+            ["gradient=[[0,1.0],[999750,0.0]]", "tunnels=[[99000,99500]]\ngradient=[[0,0.0]]"]
+        {
+            let text = format!("[track]\nname='l'\nlength_m=1000\n{places}");
+            assert_eq!(codes_on(line(&text), |_| {}), ["line_length"], "{places}");
+        }
     }
 
     #[test]

@@ -6,6 +6,7 @@ use dynocar_model::train::PowerTrain;
 use toml::Value;
 
 use super::diagnostic::{Diagnostic, implausible_columns, read_as};
+use super::force_faults::force_faults;
 use super::forces::{Force, ForceSource};
 use super::keys::run::DIRECTION;
 use super::order::quantile;
@@ -74,6 +75,7 @@ pub(super) fn diagnostics(
         diagnostics.push(Diagnostic::new("gradient_unknown", Info, text, []));
     }
     diagnostics.extend(implausible_columns(run));
+    diagnostics.extend(force_faults(context, run));
     diagnostics
 }
 
@@ -267,6 +269,7 @@ fn of_position(
                         to place it on the line";
             diagnostics.push(Diagnostic::new("start_unknown", Info, text, []));
         }
+        of_line(context, quality, diagnostics);
         return;
     }
     let positions = run.order.rows().map(|row| run.position_m[row]).filter(|it| !it.is_nan());
@@ -310,6 +313,11 @@ fn of_position(
         let figures = [("position_m", position_m.into()), ("speed_m", speed_m.into())];
         diagnostics.push(Diagnostic::new("distance_mismatch", Warning, text, figures));
     }
+    of_line(context, quality, diagnostics);
+}
+
+/// Adds the diagnostic of positions outside the line.
+fn of_line(context: Context, quality: &RunQuality, diagnostics: &mut Vec<Diagnostic>) {
     let length_m = context.track.and_then(|track| track.length_m);
     // A train may stop with its head at the line's end and its centre half a length outside.
     let beyond_m = LINE_TOLERANCE_M + 0.5 * context.train.length_m;

@@ -34,6 +34,7 @@ mod diagnosing;
 pub mod diagnostic;
 pub mod document;
 pub mod error;
+mod force_faults;
 mod forces;
 pub mod format;
 pub mod formats;

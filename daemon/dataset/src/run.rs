@@ -12,6 +12,7 @@ use super::diagnosing::diagnostics;
 use super::diagnostic::{Diagnostic, read_as};
 use super::error::{DatasetError, SourcePosition};
 
+use super::force_faults::BRAKE_ALWAYS_ZERO;
 use super::forces::{self, ForceSource};
 use super::format::{RunColumns, RunContent};
 use super::formats;
@@ -123,7 +124,8 @@ impl Run {
             }
         }
         let of_brake = |it: &Diagnostic| {
-            it.fault.is_some_and(|(detected, _)| detected.fault == InputFault::BrakeScale)
+            it.code == BRAKE_ALWAYS_ZERO
+                || it.fault.is_some_and(|(detected, _)| detected.fault == InputFault::BrakeScale)
         };
         self.diagnostics.retain(|it| !of_brake(it));
     }

@@ -121,7 +121,7 @@ fn understood<'a>(path: &Path, config: &'a DaemonConfig) -> CheckAnswer<Content<
         valid: true,
         errors: Vec::new(),
         error: None,
-        diagnostics: Vec::new(),
+        diagnostics: config.diagnostics().into_iter().map(|(_, diagnostic)| diagnostic).collect(),
         content: Some(Content { daemon: answer(config) }),
     }
 }
@@ -215,7 +215,13 @@ pub fn report(config: &DaemonConfig) -> String {
             answers.push(vec![quantity.into(), train.id.to_string(), name.into()]);
         }
     }
-    format!("{text}\n{trains}\n{pipelines}\n{answers}")
+    let notes: String = config
+        .diagnostics()
+        .iter()
+        .map(|(train, diagnostic)| format!("train {train}: {}\n", diagnostic.labelled()))
+        .collect();
+    let notes = if notes.is_empty() { notes } else { format!("\nnotes\n{notes}") };
+    format!("{text}\n{trains}\n{pipelines}\n{answers}{notes}")
 }
 
 /// Returns each quantity that a train's controller may ask for, with the pipeline that answers.

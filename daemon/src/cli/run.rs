@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use dynocar_client::ChannelError;
-use tracing_subscriber::filter::Targets;
+use tracing::warn;
 use tracing_subscriber::prelude::*;
 
 use super::Failure;
@@ -30,6 +30,9 @@ pub struct RunArguments {
 pub fn execute(arguments: &RunArguments) -> Result<(), Failure> {
     let config = DaemonConfig::load(&arguments.config)?;
     let log = start_log(&config)?;
+    for (train, diagnostic) in config.diagnostics() {
+        warn!(train = train.0, "{}", diagnostic.labelled());
+    }
     let ended = run(&config);
     drop(log);
     ended.map_err(|error| match error {
@@ -43,7 +46,7 @@ pub fn execute(arguments: &RunArguments) -> Result<(), Failure> {
 ///
 /// # Errors
 ///
-/// A filter that cannot be read is an input failure.
+/// When the system gives no thread.
 pub fn start_log(config: &DaemonConfig) -> Result<Log, Failure> {
     // Each pipeline of each train says its status at the start and its counts at the end.
     let burst = 2 * config.trains.len() * config.pipelines.len();
@@ -57,15 +60,10 @@ pub fn start_log(config: &DaemonConfig) -> Result<Log, Failure> {
         LogFormat::Text => log.with_target(false).boxed(),
         LogFormat::Json => log.json().boxed(),
     };
-    tracing_subscriber::registry().with(filter(&config.process.log)?).with(log).init();
+    // One that is not understood is refused with the configuration.
+    let filter = config.process.log_filter().unwrap_or_default();
+    tracing_subscriber::registry().with(filter).with(log).init();
     Ok(Log(queue))
-}
-
-/// Returns the filter of the log: a level, or levels by module.
-fn filter(log: &str) -> Result<Targets, Failure> {
-    log.parse().map_err(|error| {
-        Failure::Input(format!("daemon.log = {log:?}: expected a level as info or debug: {error}"))
-    })
 }
 
 /// Show controller, daemon and client at work on recorded runs, in 20 seconds.
@@ -103,29 +101,5 @@ pub fn execute_demo(arguments: &DemoArguments) -> Result<(), Failure> {
         lost => Err(Failure::Work(format!(
             "{lost} samples were lost at {rate} times the recorded rate"
         ))),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use tracing::Level;
-
-    use super::*;
-
-    #[test]
-    fn a_log_is_a_level_or_levels_by_module() {
-        let is_logged =
-            |log: &str, level| filter(log).unwrap().would_enable("dynocar::run", &level);
-        assert!(is_logged("info", Level::INFO) && !is_logged("info", Level::DEBUG));
-        assert!(is_logged("dynocar=debug", Level::DEBUG));
-        assert!(!is_logged("dynocar=debug", Level::TRACE));
-        assert!(is_logged("dynocar::run=trace,warn", Level::TRACE));
-        assert!(!is_logged("dynocar::runtime=trace,warn", Level::INFO));
-        assert!(!is_logged("off", Level::ERROR));
-        let expected = "daemon.log = \"dynocar=loud\": expected a level as info or debug: ";
-        let refusal = filter("dynocar=loud").unwrap_err();
-        let is_in_words =
-            |it: &Failure| matches!(it, Failure::Input(words) if words.starts_with(expected));
-        assert!(is_in_words(&refusal), "{refusal:?}");
     }
 }

@@ -5,6 +5,8 @@ use std::net::SocketAddr;
 use std::path::Path;
 use std::sync::Arc;
 
+use dynocar_dataset::dataset_diagnostic::diagnostics;
+use dynocar_dataset::{DatasetDiagnostic, keys};
 use dynocar_estimators::EstimatorSettings;
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
@@ -73,6 +75,13 @@ impl DaemonConfig {
         DaemonConfig::from_text(path, &text)
     }
 
+    /// Returns the diagnostics of the declared trains and their lines, with each train.
+    pub fn diagnostics(&self) -> Vec<(TrainId, DatasetDiagnostic)> {
+        let found = |train: &TrainConfig| diagnostics(&train.model, train.track.as_deref(), []);
+        let of_train = |train| found(train).into_iter().map(|it| (train.id, it));
+        self.trains.iter().flat_map(of_train).collect()
+    }
+
     /// Checks the text of a configuration, and the train and track files it names; `path` is the
     /// file it came from.
     ///
@@ -104,6 +113,11 @@ pub fn check(path: &Path, text: &str) -> Result<DaemonConfig, ConfigError> {
     let (mut trains, named): (Vec<_>, Vec<_>) =
         check_trains(&checker, raw.trains)?.into_iter().unzip();
     let process = raw.daemon;
+    if process.log_filter().is_none() {
+        let allowed =
+            "off, error, warn, info, debug or trace, or these by module, as dynocar=debug";
+        return checker.refuse("daemon.log", format!("{:?}", process.log), allowed);
+    }
     let mut threads = check_threads(&checker, raw.threads, process.idle)?;
     let pipelines = check_pipelines(&checker, raw.pipelines, &trains, &mut threads, process.idle)?;
     for (train, named) in trains.iter_mut().zip(&named) {
@@ -343,6 +357,13 @@ fn check_models(checker: &Checker, raw: RawModels) -> Result<ModelsConfig, Confi
         return checker.refuse(key, trips_between_mistakes, "20 to 1e12 trips");
     }
     for (key, [low, high]) in &raw.bounds {
+        let numbers = keys::TRAIN_TABLES.iter().flat_map(|table| keys::numbers_of(table));
+        let mut numbers = numbers.map(keys::FileKey::from).chain([keys::brake::MAX_FORCE]);
+        if numbers.all(|it| *key != format!("{}.{}", it.table, it.name)) {
+            let allowed =
+                "the table and the key of a number in a train's file, as \"resistance.a\"";
+            return checker.refuse("models.bounds", format!("{key:?}"), allowed);
+        }
         if !(low.is_finite() && high.is_finite() && low <= high) {
             let (key, given) = (format!("models.bounds.{key:?}"), format!("[{low}, {high}]"));
             return checker.refuse(key, given, "the least value, then the greatest");

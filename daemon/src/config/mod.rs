@@ -28,6 +28,7 @@ use dynocar_estimators::EstimatorSettings;
 use dynocar_model::named;
 use dynocar_shared::TrainId;
 use serde::Deserialize;
+use tracing_subscriber::filter::{LevelFilter, Targets};
 
 use crate::shadow::rule::{Adopt, Rule};
 
@@ -202,6 +203,21 @@ pub struct ModelsConfig {
     pub interval_s: u64,
 }
 
+impl ProcessConfig {
+    /// Returns the filter of the log: a level, or levels by module; `None` for other words, which would be taken for the
+    /// name of a module, and nothing would be logged.
+    pub fn log_filter(&self) -> Option<Targets> {
+        let is_level =
+            |word: &str| !word.trim().is_empty() && word.trim().parse::<LevelFilter>().is_ok();
+        let is_understood = |part: &str| match part.split_once('=') {
+            Some((module, level)) => module.trim().starts_with("dynocar") && is_level(level),
+            None => is_level(part),
+        };
+        let is_all_understood = self.log.split(',').all(is_understood);
+        self.log.parse().ok().filter(|_| is_all_understood)
+    }
+}
+
 /// A thread that serves pipelines.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ThreadConfig {
@@ -331,4 +347,29 @@ pub fn build_pipeline(
     snapshot.train_quantities = train.answers.all_bits();
     snapshot.model_hash = train.model_hash.0;
     Ok(pipeline)
+}
+
+#[cfg(test)]
+mod tests {
+    use tracing::Level;
+
+    use super::*;
+
+    #[test]
+    fn a_log_is_a_level_or_levels_by_module_and_nothing_else() {
+        let filter =
+            |log: &str| ProcessConfig { log: log.into(), ..Default::default() }.log_filter();
+        let is_logged =
+            |log: &str, level| filter(log).unwrap().would_enable("dynocar::run", &level);
+        assert!(is_logged("info", Level::INFO) && !is_logged("info", Level::DEBUG));
+        assert!(is_logged("dynocar=debug", Level::DEBUG));
+        assert!(!is_logged("dynocar=debug", Level::TRACE));
+        assert!(is_logged("dynocar::run=trace,warn", Level::TRACE));
+        assert!(!is_logged("dynocar::runtime=trace,warn", Level::INFO));
+        assert!(!is_logged("off", Level::ERROR));
+        // Words that would be taken for modules, so that nothing would be logged.
+        for wrong in ["infoo", "warning", "daemon=debug", "dynocar=loud", "info,foo=bar", ""] {
+            assert!(filter(wrong).is_none(), "{wrong}");
+        }
+    }
 }

@@ -101,8 +101,10 @@ impl PipelineHealth {
         };
         let of_quantity = |quantity: Quantity, state: UseState, why: &str| match state {
             UseState::Usable => format!("; {quantity} usable"),
-            _ if why == state.name() => format!("; {quantity} {state}: {}", state.ends()),
-            _ => format!("; {quantity} {state} ({why}): {}", state.ends()),
+            _ if why == state.name() => {
+                format!("; {quantity} {state}: {}", state.ends(self.reason))
+            }
+            _ => format!("; {quantity} {state} ({why}): {}", state.ends(self.reason)),
         };
         let uses =
             self.uses.iter().map(|&(quantity, state, why)| of_quantity(quantity, state, why));
@@ -111,6 +113,22 @@ impl PipelineHealth {
 
     fn verdict(&self) -> Verdict {
         if self.is_stale { Verdict::Stale } else { Verdict::new(self.status, self.reason) }
+    }
+
+    /// Returns whether nothing was learned, for lack of something in the samples.
+    fn is_starved(&self) -> bool {
+        self.status == Status::Unestimated && self.reason.is_some_and(Reason::is_of_input)
+    }
+}
+
+/// Returns the verdict on a train's pipelines. A pipeline that lacks a quantity is no fault, since not every train
+/// measures all, unless no other one learns anything.
+fn verdict_of(pipelines: &[PipelineHealth]) -> Verdict {
+    let worst = pipelines.iter().map(PipelineHealth::verdict).max().unwrap_or(Verdict::Stale);
+    let learns_none = pipelines.iter().all(|it| it.status == Status::Unestimated);
+    match learns_none && pipelines.iter().any(PipelineHealth::is_starved) {
+        true => worst.max(Verdict::Degraded),
+        false => worst,
     }
 }
 
@@ -136,15 +154,22 @@ impl TrainHealth {
         }
     }
 
-    /// A suspect says more than that the model lacks something, and a reason for refusals more than
-    /// that the input is bad.
+    /// Samples that cannot be true come first: a suspect may follow from them. A suspect says more than that the model lacks
+    /// something, and a reason for refusals more than that the input is bad.
     fn remedy_of_pipelines(&self) -> &'static str {
-        let mut amiss = self.pipelines.iter().filter(|it| it.verdict() == Verdict::Degraded);
+        let is_implausible = |reason: &Reason| reason.is_implausible_input();
+        let implausible = self.pipelines.iter().find_map(|it| it.reason.filter(is_implausible));
+        if let Some(reason) = implausible {
+            return of_reason(reason);
+        }
         let suspect = self.pipelines.iter().find_map(|it| it.suspicion?.effect);
         if let Some(effect) = suspect {
             return KindRow::of(effect).to_do;
         }
-        let Some(first) = amiss.next() else { return Verdict::Degraded.remedy() };
+        let is_amiss = |it: &&PipelineHealth| it.verdict() == Verdict::Degraded;
+        let starved = || self.pipelines.iter().find(|it| it.is_starved());
+        let first = self.pipelines.iter().find(is_amiss).or_else(starved);
+        let Some(first) = first else { return Verdict::Degraded.remedy() };
         match first.reason {
             Some(Reason::BadInput) => {
                 let refusal = first.refused.iter().find_map(|it| of_refusal(it.0));
@@ -176,7 +201,7 @@ pub fn look_at(host: &Host, train: TrainId) -> Result<TrainHealth, ChannelError>
         return Ok(TrainHealth { train, verdict, daemon, pipelines: Vec::new() });
     }
     let pipelines = pipelines_of(&mut ObservedTrain::open(host, train)?);
-    let verdict = pipelines.iter().map(PipelineHealth::verdict).max().unwrap_or(Verdict::Stale);
+    let verdict = verdict_of(&pipelines);
     Ok(TrainHealth { train, verdict, daemon, pipelines })
 }
 
@@ -233,6 +258,29 @@ mod tests {
         assert_eq!(large, Verdict::Degraded);
         let silent = PipelineHealth { is_stale: true, ..pipeline(Reason::DaemonSilent) };
         assert_eq!(silent.verdict(), Verdict::Stale);
+    }
+
+    #[test]
+    fn a_train_that_learns_nothing_for_lack_of_a_quantity_is_degraded() {
+        let waiting = |reason| PipelineHealth { status: Status::Unestimated, ..pipeline(reason) };
+        let known = PipelineHealth { status: Status::Estimated, ..pipeline(Reason::None) };
+        let starved = || waiting(Reason::MissingQuantity);
+        assert_eq!(verdict_of(&[starved(), waiting(Reason::TooFewSamples)]), Verdict::Degraded);
+        assert_eq!(
+            verdict_of(&[starved(), known]),
+            Verdict::Ok,
+            "a brake without a pressure sensor"
+        );
+        assert_eq!(
+            verdict_of(&[waiting(Reason::TooFewSamples)]),
+            Verdict::Ok,
+            "a train that stands"
+        );
+        let words = PipelineHealth {
+            uses: vec![(Quantity::Mass, UseState::Learning, "missing_quantity")],
+            ..starved()
+        };
+        assert!(words.in_words().ends_with("(missing_quantity): it ends with its reason"));
     }
 
     fn pipeline(reason: Reason) -> PipelineHealth {
@@ -297,8 +345,14 @@ mod tests {
         assert!(degraded(vec![pipeline(Reason::BadInput)]).contains("mend the samples"));
         let fine =
             PipelineHealth { status: Status::Unestimated, ..pipeline(Reason::OnlyLowerBound) };
-        let faults = pipeline(Reason::ImplausibleForces);
+        let faults = PipelineHealth {
+            suspicion: Suspicion::from_snapshot(&snapshot),
+            ..pipeline(Reason::ImplausibleForces)
+        };
         assert!(degraded(vec![fine, faults]).contains("unit, sign and order"));
+        let starved =
+            PipelineHealth { status: Status::Unestimated, ..pipeline(Reason::MissingQuantity) };
+        assert!(degraded(vec![starved]).contains("send what the pipeline needs"));
         assert_eq!(train(Verdict::Ok, vec![large]), "nothing");
         assert!(train(Verdict::NoDaemon, vec![]).contains("dynocar run"));
     }

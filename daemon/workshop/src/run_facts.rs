@@ -5,7 +5,6 @@ use dynocar::models::UtcSecond;
 use dynocar_analysis::dataset::{
     DatasetDiagnostic, ForceSource, GradientSource, PositionSource, Run,
 };
-use dynocar_core::plausibility::Severity;
 
 /// Returns a run's mass in t: the declared one, or the mean of the masses in its samples, with their range where they
 /// differ.
@@ -66,13 +65,7 @@ pub fn moment(time_s: f64) -> Option<UtcSecond> {
 
 /// Notes on a dataset, each from a line of its own; those by which it cannot be true say so.
 pub fn diagnostics(diagnostics: &[DatasetDiagnostic]) -> String {
-    let line = |diagnostic: &DatasetDiagnostic| {
-        let head = match diagnostic.severity {
-            Severity::Fundamental => "cannot be true",
-            _ => "note",
-        };
-        format!("{}\n", wrap(&format!("{head}: {diagnostic}"), WIDTH).join("\n  "))
-    };
+    let line = |it: &DatasetDiagnostic| format!("{}\n", wrap(&it.labelled(), WIDTH).join("\n  "));
     diagnostics.iter().map(line).collect()
 }
 

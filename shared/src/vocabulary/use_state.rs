@@ -41,16 +41,17 @@ impl UseState {
         }
     }
 
-    /// Returns the event that ends the state, in words.
-    pub const fn ends(self) -> &'static str {
-        match self {
-            UseState::Usable => "half a second of doubt ends it",
-            UseState::Learning => "driving ends it",
-            UseState::Confirming => {
+    /// Returns the event that ends the state, in words; `reason` is the one behind the status.
+    pub const fn ends(self, reason: Option<Reason>) -> &'static str {
+        match (self, reason) {
+            (UseState::Usable, _) => "half a second of doubt ends it",
+            (UseState::Learning, Some(reason)) if reason.is_of_input() => "it ends with its reason",
+            (UseState::Learning, _) => "driving ends it",
+            (UseState::Confirming, _) => {
                 "2 s without doubt end it, after a doubt 5 s, after each further one twice as long, up to 10 min"
             }
-            UseState::Doubted => "it ends with its reason",
-            UseState::Unavailable => "a daemon, or an estimate learned anew, ends it",
+            (UseState::Doubted, _) => "it ends with its reason",
+            (UseState::Unavailable, _) => "a daemon, or an estimate learned anew, ends it",
         }
     }
 }
@@ -58,6 +59,15 @@ impl UseState {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_driving_ends_what_the_samples_lack() {
+        for &reason in Reason::ALL {
+            let is_by_driving = UseState::Learning.ends(Some(reason)) == "driving ends it";
+            assert_eq!(is_by_driving, !reason.is_of_input(), "{reason}");
+        }
+        assert!(Reason::BadInput.is_of_input() && !Reason::TooFewSamples.is_of_input());
+    }
 
     #[test]
     fn what_is_not_usable_never_gives_none_for_a_reason() {

@@ -1,12 +1,12 @@
 //! Drives, brakes and cylinders: acting forces from the driver's commands.
 
-use dynocar_model::simulate::elements::{DeadTime, lagged};
+use dynocar_model::simulate::motion::{DeadTime, lagged};
 
 use super::driving::Controls;
 use super::train_maker::TrueTrain;
 
 /// Returns `value` moved towards a goal by at most `change`. Unlike
-/// [`elements::slewed`](dynocar_model::simulate::elements::slewed) it may miss the goal by rounding; the numbers of
+/// [`motion::slewed`](dynocar_model::simulate::motion::slewed) it may miss the goal by rounding; the numbers of
 /// seeded datasets depend on that.
 pub(crate) fn slewed(value: f64, goal: f64, change: f64) -> f64 {
     value + (goal - value).clamp(-change, change)

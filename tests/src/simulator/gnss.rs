@@ -1,7 +1,7 @@
 //! A simulated GNSS receiver.
 
 use dynocar_analysis::survey::alignment::LocalPlane;
-use dynocar_model::simulate::elements::autoregressed;
+use dynocar_model::simulate::motion::autoregressed;
 use dynocar_shared::TrainSample;
 
 use super::line_maker::SimulatedLine;

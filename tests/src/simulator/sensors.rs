@@ -1,6 +1,6 @@
 //! Simulated sensors.
 
-use dynocar_model::simulate::elements::{lagged, quantised, shown};
+use dynocar_model::simulate::motion::{lagged, quantised, shown};
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 

@@ -1,6 +1,6 @@
 //! Random trains of four types.
 
-use dynocar_model::simulate::elements::quantised;
+use dynocar_model::simulate::motion::quantised;
 use dynocar_model::train::{BrakeGear, Davis, EffortCurve, TrainModel};
 
 use super::random::SimulatorRandom;

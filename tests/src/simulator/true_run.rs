@@ -1,6 +1,6 @@
 //! One run as it truly happened.
 
-use dynocar_model::simulate::elements::autoregressed;
+use dynocar_model::simulate::motion::autoregressed;
 use dynocar_model::simulate::motion::{SimulatedMotion, advance};
 use dynocar_model::train::TrainModel;
 

@@ -5,7 +5,7 @@
 //! Its Fisher information about the true speed is the sum over steps of (dp/dspeed)² / p, averaged over where in a step
 //! the true speed lies.
 
-use dynocar_model::simulate::elements::quantised;
+use dynocar_model::simulate::motion::quantised;
 use dynocar_model::simulate::motion::{SimulatedMotion, advance};
 use dynocar_model::train::Davis;
 use dynocar_tests::chance::Chance;

@@ -8,8 +8,8 @@ use dynocar_estimators::wang::{
     MassKalman, MassKalmanSettings, MassRegression, StagedDescent, StagedDescentSettings,
 };
 use dynocar_model::force::ResolvedSample;
-use dynocar_model::simulate::elements::{autoregressed, quantised, shown, slewed};
 use dynocar_model::simulate::motion::deceleration_mps2;
+use dynocar_model::simulate::motion::{autoregressed, quantised, shown, slewed};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use dynocar_tests::chance::Chance;

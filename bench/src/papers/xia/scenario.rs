@@ -10,7 +10,7 @@ use dynocar_core::filter::triangular::{TriangularAccumulator, TriangularSystem};
 use dynocar_estimators::xia::trajectory::step::TrajectoryStep;
 use dynocar_estimators::xia::wolfe_newton::NewtonSettings;
 use dynocar_model::force::mps2_per_n_per_kn;
-use dynocar_model::simulate::elements::autoregressed;
+use dynocar_model::simulate::motion::autoregressed;
 use dynocar_model::track::{Track, TrackCurve};
 use dynocar_model::train::Davis;
 use dynocar_tests::chance::Chance;

@@ -238,3 +238,13 @@ fn pressure_factor(pressure_pa: f64) -> f64 {
         .min_by(|one, other| distance(one).total_cmp(&distance(other)))
         .unwrap_or(1.0)
 }
+
+impl Severity {
+    /// Returns the head of a line that states a diagnostic.
+    pub const fn label(self) -> &'static str {
+        match self {
+            Severity::Fundamental => "cannot be true",
+            Severity::Info | Severity::Warning => "note",
+        }
+    }
+}

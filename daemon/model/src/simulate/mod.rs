@@ -8,7 +8,7 @@
 //! Over a recorded run ([`OpenLoopRecording`], [`Prediction`]) the simulation is open loop: the reported forces act,
 //! the track is looked up at the measured position, the predicted speed is compared with the measured one. It is the
 //! judge of every model, and an optimiser calls it thousands of times. Simulators of driven trains, which look the
-//! track up at the simulated position, use the same step ([`motion::advance`]) and the same [`elements`].
+//! track up at the simulated position, use the same step and the same elements ([`motion`]).
 //!
 //! # Integration
 //!
@@ -25,7 +25,6 @@
 
 #[cfg(test)]
 mod analytic_tests;
-pub mod elements;
 #[cfg(test)]
 mod gap_tests;
 pub mod motion;

@@ -25,6 +25,9 @@ use crate::error::ChannelError;
 /// Longest wait for a service that another process is making or destroying.
 const SETTLING_TIME: Duration = Duration::from_millis(800);
 
+/// The service of a channel.
+type ChannelService<T> = PortFactory<ipc::Service, Wire<T>, ()>;
+
 /// This thread's place in the transport.
 #[derive(Debug)]
 pub struct Entrance {
@@ -40,7 +43,7 @@ impl Entrance {
     pub(super) fn service<T: Payload>(
         &self,
         train: TrainId,
-    ) -> Result<(PortFactory<ipc::Service, Wire<T>, ()>, Making), ChannelError> {
+    ) -> Result<(ChannelService<T>, Making), ChannelError> {
         let text = service_name::<T>(train);
         let refused = |reason: String| ChannelError::transport(format!("service {text}"), reason);
         let name = ServiceName::new(&text).map_err(|error| refused(format!("{error:?}")))?;

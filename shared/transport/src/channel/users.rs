@@ -60,7 +60,7 @@ pub struct Making(LockedFile);
 impl Drop for Making {
     fn drop(&mut self) {
         if let Some(file) = self.0.own() {
-            // Otherwise the next one looks for what was left incomplete, and finds nothing.
+            // Otherwise the next one looks for incomplete files, and finds none.
             let _ = file.set_len(0);
         }
     }
@@ -90,8 +90,8 @@ impl Users {
 
     /// Begins the making of a node, a service or a port, which one process does at a time.
     ///
-    /// Removes what processes that were killed left incomplete: where the one before was killed at it, at the first call,
-    /// and where the transport has refused something (`is_refused`), since leaving removes services too.
+    /// Removes the incomplete files of processes that were killed: where the one before was killed at it, at the first
+    /// call, and where the transport has refused something (`is_refused`), since leaving removes services too.
     ///
     /// # Errors
     ///

@@ -10,8 +10,8 @@ use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::{EffectKind, KindRow};
 
 use crate::explain::answer::{
-    EffectAnswer, EffectMeaning, HeldOutAnswer, Location, MassWindow, ParameterValue,
-    PlaceUncertainty, RunWindow, Verdict, VerdictWords, WithStd, in_plain_words,
+    EffectAnswer, EffectMeaning, HeldOutAnswer, Location, MassWindow, ParameterValue, RunWindow,
+    Verdict, VerdictWords, WithStd, in_plain_words,
 };
 use crate::explain::competing::{CompetingHypotheses, kinds_of};
 use crate::explain::over_time::CHANCE_MAX;
@@ -40,6 +40,16 @@ fn listed(sizes: &[String]) -> String {
 /// Returns the numbers of an effect, each with its meaning, unit and 95 % interval.
 pub fn sizes(parameters: &Values, std: &Values) -> Vec<String> {
     let mut sizes = Vec::new();
+    // A change of mass with its 95 % interval, by its number in the list.
+    let change = |name: &str, index: usize, mass_factor: f64| {
+        let percent = 100.0 * (mass_factor - 1.0);
+        let half = match std.get(name) {
+            Some(ParameterValue::List(all)) => all.get(index).map(|std| 100.0 * HALF_95 * std),
+            _ => None,
+        };
+        let half = half.map_or(String::new(), |half| format!(" ± {half:.1}"));
+        format!("{percent:+.1}{half} %").replace('-', "−")
+    };
     for (name, value) in parameters {
         match value {
             ParameterValue::Number(value) => {
@@ -60,29 +70,31 @@ pub fn sizes(parameters: &Values, std: &Values) -> Vec<String> {
                 );
             }
             ParameterValue::Sections(sections) => {
-                let shown = sections.iter().take(PLACES_MAX);
-                sizes.extend(shown.map(|s| {
-                    let place = stretch([s.from_m, s.to_m]);
-                    let percent = 100.0 * (s.mass_factor - 1.0);
-                    format!("{percent:+.1} % {place} (direction {:+})", s.direction)
-                        .replace('-', "−")
+                let shown = sections.iter().enumerate().take(PLACES_MAX);
+                sizes.extend(shown.map(|(index, s)| {
+                    let place = stretch([s.from_m, s.to_m]).replace('-', "−");
+                    let direction = format!("{:+}", s.direction).replace('-', "−");
+                    let change = change(name, index, s.mass_factor);
+                    format!("{change} {place} (direction {direction})")
                 }));
             }
             ParameterValue::Formula(formula) => sizes.insert(0, in_plain_words(formula)),
             ParameterValue::Windows(windows) => {
-                let all = in_order(windows, |it| (&it.window.run, it.window.t_start_s));
-                sizes.extend(all.take(PLACES_MAX).map(|MassWindow { window, mass_factor }| {
-                    let percent =
-                        format!("{:+.1} %", 100.0 * (mass_factor - 1.0)).replace('-', "−");
-                    let RunWindow { run, t_start_s, t_end_s } = window;
-                    let is_one = windows.iter().filter(|it| it.window.run == *run).count() == 1;
-                    let time = if is_one {
-                        String::new()
-                    } else {
-                        format!(" from {t_start_s:.0} to {t_end_s:.0} s")
-                    };
-                    format!("{percent} in {run}{time}")
-                }));
+                let all: Vec<(usize, &MassWindow)> = windows.iter().enumerate().collect();
+                let all = in_order(&all, |(_, it)| (&it.window.run, it.window.t_start_s));
+                sizes.extend(all.take(PLACES_MAX).map(
+                    |(index, MassWindow { window, mass_factor })| {
+                        let change = change(name, *index, *mass_factor);
+                        let RunWindow { run, t_start_s, t_end_s } = window;
+                        let is_one = windows.iter().filter(|it| it.window.run == *run).count() == 1;
+                        let time = if is_one {
+                            String::new()
+                        } else {
+                            format!(" from {t_start_s:.0} to {t_end_s:.0} s")
+                        };
+                        format!("{change} in {run}{time}")
+                    },
+                ));
             }
             ParameterValue::List(_) | ParameterValue::Profile(_) => {}
         }
@@ -233,13 +245,14 @@ pub fn located(place: &Location) -> Option<String> {
         parts.push(format!("while {} is {low} to {high}", covariate.name));
     }
     if !parts.is_empty() {
-        parts.extend(place.uncertainty_95.as_ref().and_then(precision));
+        parts.extend(precision(place));
     }
     (!parts.is_empty()).then(|| parts.join(", "))
 }
 
 /// Returns how well the ends of a place are known: half of the widest 95 % interval.
-fn precision(known: &PlaceUncertainty) -> Option<String> {
+fn precision(place: &Location) -> Option<String> {
+    let known = place.uncertainty_95.as_ref()?;
     let half = |interval: [f64; 2]| 0.5 * (interval[1] - interval[0]);
     let widest = |ends: &mut dyn Iterator<Item = [f64; 2]>| ends.map(half).reduce(f64::max);
     let ends_m = widest(&mut known.intervals_m.iter().flatten().flatten().copied());
@@ -249,13 +262,32 @@ fn precision(known: &PlaceUncertainty) -> Option<String> {
     let shown = [
         ends_m.map(|half| format!("{half:.0} m")),
         ends_s.map(|half| format!("{half:.0} s")),
-        range.filter(|_| ends_m.is_none()).map(|half| format!("{half:.1}")),
+        range.filter(|_| ends_m.is_none()).map(|half| {
+            let half = number(half, Some(0.1 * half));
+            format!("{half} {}", unit_of_range(place)).trim_end().to_owned()
+        }),
     ];
     let shown: Vec<String> = shown.into_iter().flatten().collect();
     if ends_m.or(ends_s) == Some(0.0) {
         return Some("ends certain".into());
     }
     (!shown.is_empty()).then(|| format!("ends known to ± {} or better", shown.join(", ± ")))
+}
+
+/// Returns the unit of a place's range, by the end of its covariate's name.
+fn unit_of_range(place: &Location) -> &'static str {
+    let name = place.covariate.as_ref().map_or("", |it| it.name.as_str());
+    match name.rsplit('_').next() {
+        _ if place.speed_range_mps.is_some() => "m/s",
+        Some("mps") => "m/s",
+        Some("m") => "m",
+        Some("n") => "N",
+        Some("s") => "s",
+        Some("pa") => "Pa",
+        Some("permille") => "‰",
+        Some("c") => "°C",
+        _ => "",
+    }
 }
 
 /// Returns a verdict with its effects, the kinds that explain the runs as well as some of them, and the questions that
@@ -308,93 +340,4 @@ pub fn verdict_words(
         _ => heading.clone(),
     };
     VerdictWords { heading: heading + ".", whole: whole + ".", left }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::explain::answer::CovariateRange;
-
-    #[test]
-    fn what_an_effect_means_is_said_in_kwh_and_metres() {
-        let costs = EffectMeaning {
-            energy_kwh_per_100_km: 41.26,
-            share_of_traction_energy: Some(0.0312),
-            distance_error_60_s_m: Some([14.52, 2.13]),
-        };
-        assert_eq!(
-            meaning(&costs),
-            "41.3 kWh per 100 km more, 3.1 % of the traction's energy; a minute ahead, the model errs by \
-             14.5 m without this effect, 2.1 m with it"
-        );
-        let helps = EffectMeaning {
-            energy_kwh_per_100_km: -2.0,
-            share_of_traction_energy: Some(-0.01),
-            distance_error_60_s_m: None,
-        };
-        assert_eq!(meaning(&helps), "2.00 kWh per 100 km less, 1.0 % of the traction's energy");
-        assert_eq!(meaning(&EffectMeaning::default()), "");
-    }
-
-    #[test]
-    fn places_are_reported_in_words_with_the_precision_of_their_ends() {
-        let known = PlaceUncertainty {
-            intervals_m: Some(vec![[[5180.0, 5220.0], [6890.0, 6910.0]]]),
-            ..PlaceUncertainty::default()
-        };
-        let tunnel = Location {
-            uncertainty_95: Some(known),
-            ..Location::of_intervals(vec![[5200.0, 6900.0]])
-        };
-        assert_eq!(
-            located(&tunnel).as_deref(),
-            Some("from km 5.20 to 6.90, ends known to ± 20 m or better")
-        );
-        let window = RunWindow { run: "runs/03.csv".into(), t_start_s: 204.0, t_end_s: 729.6 };
-        let covariate = CovariateRange { name: "brake_force_n".into(), range: [1e3, 2.5e4] };
-        let place = Location {
-            windows: Some(vec![window]),
-            speed_range_mps: Some([10.0, 12.5]),
-            covariate: Some(covariate),
-            ..Location::default()
-        };
-        assert_eq!(
-            located(&place).as_deref(),
-            Some(
-                "in runs/03.csv from 204 to 730 s, at 10.0 to 12.5 m/s, \
-                 while brake_force_n is 1000 to 25000"
-            )
-        );
-        assert_eq!(located(&Location::default()), None);
-    }
-
-    #[test]
-    fn an_effect_is_reported_with_its_size_and_interval() {
-        let number = |value| [("force_n".to_string(), ParameterValue::Number(value))].into();
-        let effect = EffectAnswer {
-            kind: "dragging_brake",
-            place: Location { runs: Some(vec!["runs/02.csv".into()]), ..Location::default() },
-            parameters: number(3058.6),
-            std: number(107.5),
-            p_value: 1e-9,
-            error_reduction: 0.8,
-            meaning: EffectMeaning::default(),
-            contradiction: None,
-            over_time: Vec::new(),
-            held_out: None,
-            runners_up: Vec::new(),
-        };
-        assert_eq!(
-            described(&effect),
-            "a dragging brake in runs/02.csv – drag force 3059 N (95 % interval 2848 to 3269)"
-        );
-    }
-
-    #[test]
-    fn contradicting_scales_are_stated_in_percent_with_their_intervals() {
-        let [positions, motion] =
-            [(1.015, 0.001), (1.003, 0.002)].map(|(value, std)| WithStd { value, std });
-        let sentence = contradicting_scales(&ScaleSources { positions, motion });
-        assert!(sentence.contains("+1.50 ± 0.20 %") && sentence.contains("+0.30 ± 0.39 %"));
-    }
 }

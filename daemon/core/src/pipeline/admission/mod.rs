@@ -210,7 +210,8 @@ impl Admission {
         let is_refusing = self.invalid_share > INVALID_SHARE.high;
         let is_doubted = is_refusing || implausible.is_some();
         let is_estimated = judgement.status == Status::Estimated;
-        let doubt = implausible.or((is_refusing && is_estimated).then_some(Reason::BadInput));
+        let is_open = is_estimated || judgement.status == Status::Unestimated;
+        let doubt = implausible.or((is_refusing && is_open).then_some(Reason::BadInput));
         judgement.reason = doubt.unwrap_or(judgement.reason);
         if is_doubted && is_estimated {
             judgement.status = Status::Degraded;

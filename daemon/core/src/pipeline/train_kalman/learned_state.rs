@@ -176,6 +176,14 @@ pub enum LoadChange {
     Opened { by: f64, mean: f64, variance: f64 },
 }
 
+/// Share by which a learned mass may lie outside a declared range from tare to full: crowded trains, forces a little
+/// off.
+const OUTSIDE_RANGE_MAX: f64 = 0.12;
+/// Share by which a learned mass may differ from a weighed one: scales that are off, or a constant in their place.
+const OFF_WEIGHED_MAX: f64 = 0.25;
+/// Standard deviations by which a learned mass may differ from one that is declared without a range.
+const DECLARED_STDS_MAX: f64 = 4.0;
+
 /// Follows stops and the masses that samples carry.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LoadWatch {
@@ -183,6 +191,8 @@ pub struct LoadWatch {
     mass_std: f64,
     /// Mean and standard deviation where samples carry no mass.
     declared: (f64, f64),
+    /// Least and greatest mass in kg that the declaration allows.
+    allowed_kg: (f64, f64),
     load_change_std: f64,
     /// Mass in kg that the load factor refers to; `None` before the first sample.
     declared_kg: Option<f64>,
@@ -204,7 +214,17 @@ impl LoadWatch {
         let declared = train.load_range().map_or((1.0, load_std), |(middle_kg, std_kg)| {
             (train.mass_kg / middle_kg, train.mass_kg * std_kg / (middle_kg * middle_kg))
         });
+        let (least, most) = match train.full_mass_kg {
+            Some(full_kg) => {
+                (1.0 - OUTSIDE_RANGE_MAX, (1.0 + OUTSIDE_RANGE_MAX) * full_kg / train.mass_kg)
+            }
+            None => (
+                1.0 / (1.0 + DECLARED_STDS_MAX * load_std),
+                1.0 / (1.0 - DECLARED_STDS_MAX * load_std).max(0.0),
+            ),
+        };
         LoadWatch {
+            allowed_kg: (least * train.mass_kg, most * train.mass_kg),
             stops: StopWatch::new(settings.stop_min_s),
             mass_std: 0.01 * settings.mass_std_percent,
             declared,
@@ -221,6 +241,17 @@ impl LoadWatch {
     pub fn prior(&self) -> (f64, f64) {
         let (mean, std) = if self.is_weighed { (1.0, self.mass_std) } else { self.declared };
         (mean, std * std)
+    }
+
+    /// Returns the least and the greatest mass in kg that neither the declaration nor the samples contradict: forces that
+    /// show another one are not those of the whole train, or are in another unit.
+    pub fn allowed_kg(&self) -> (f64, f64) {
+        let (mut least_kg, mut most_kg) = self.allowed_kg;
+        if let Some(weighed_kg) = self.declared_kg.filter(|_| self.is_weighed) {
+            least_kg = least_kg.max((1.0 - OFF_WEIGHED_MAX) * weighed_kg);
+            most_kg = most_kg.min((1.0 + OFF_WEIGHED_MAX) * weighed_kg);
+        }
+        (least_kg, most_kg)
     }
 
     /// Mass in kg that the load factor refers to; the declared one before the first sample.
@@ -280,103 +311,5 @@ mod tests {
         assert!((learned(2e-3_f64.sqrt()) - 1.0).abs() < 0.05);
         assert!((learned(1.5e-3_f64.sqrt()) - 0.5).abs() < 0.1);
         assert!(learned(0.0) < 0.15, "no jump at all");
-    }
-}
-
-#[cfg(test)]
-mod load_tests {
-    use dynocar_model::train::Davis;
-
-    use super::*;
-
-    const SECOND_NS: i64 = 1_000_000_000;
-
-    fn train(full_mass_kg: Option<f64>) -> TrainModel {
-        TrainModel {
-            full_mass_kg,
-            ..TrainModel::bare("t", 100e3, Davis { a: 1.0, b: 0.0, c: 0.0 })
-        }
-    }
-
-    /// Returns the changes by a train that stands from 10 to 40 s, with the mass that its samples carry.
-    fn changes(
-        settings: &TrainKalmanSettings,
-        mass_kg: impl Fn(i64) -> Option<f64>,
-    ) -> Vec<LoadChange> {
-        let mut load = LoadWatch::new(settings, &train(None));
-        let seen = (0..60).filter_map(|second| {
-            let mass = mass_kg(second);
-            load.see(&ResolvedSample {
-                time_ns: second * SECOND_NS,
-                speed_mps: if (10..40).contains(&second) { 0.0 } else { 15.0 },
-                mass_kg: mass.unwrap_or(100e3),
-                is_mass_measured: mass.is_some(),
-                ..ResolvedSample::coasting()
-            })
-        });
-        seen.collect()
-    }
-
-    #[test]
-    fn a_load_is_opened_at_a_stop_and_anew_where_it_was_weighed_again() {
-        let settings = TrainKalmanSettings::default();
-        let (weighed, declared) =
-            (LoadChange::Anew(1.0, 0.03 * 0.03), LoadChange::Anew(1.0, 0.15 * 0.15));
-        let open = |by, variance| LoadChange::Opened { by, mean: 1.0, variance };
-        let opened = open(0.1 * 0.1, 0.15 * 0.15);
-        let weighed_again = open(2.0 * 0.03 * 0.03, 0.03 * 0.03);
-        let same = |one: &[LoadChange], other: &[LoadChange]| {
-            assert_eq!(one.len(), other.len(), "{one:?}");
-            for pair in one.iter().zip(other) {
-                let (a, b) = match pair {
-                    (LoadChange::Anew(one, a), LoadChange::Anew(other, b)) => {
-                        assert_eq!(one, other, "{pair:?}");
-                        (a, b)
-                    }
-                    (
-                        LoadChange::Opened { by: a, variance, .. },
-                        LoadChange::Opened { by: b, variance: same, .. },
-                    ) => {
-                        assert!((variance / same - 1.0).abs() < 1e-12, "{pair:?}");
-                        (a, b)
-                    }
-                    _ => panic!("{pair:?}"),
-                };
-                assert!((a / b - 1.0).abs() < 1e-12, "{pair:?}");
-            }
-        };
-        same(&changes(&settings, |_| None), &[declared, opened]);
-        same(&changes(&settings, |_| Some(100e3)), &[weighed, weighed_again]);
-        let boarded = |second| Some(if second < 20 { 100e3 } else { 108e3 });
-        same(&changes(&settings, boarded), &[weighed, weighed_again, weighed]);
-    }
-
-    #[test]
-    fn a_mass_that_is_exact_is_never_opened() {
-        let exact = TrainKalmanSettings { mass_std_percent: 0.0, ..Default::default() };
-        assert_eq!(changes(&exact, |_| Some(100e3)), [LoadChange::Anew(1.0, 0.0)]);
-    }
-
-    #[test]
-    fn between_tare_and_full_load_any_mass_is_as_likely() {
-        let load = LoadWatch::new(&TrainKalmanSettings::default(), &train(Some(140e3)));
-        let (mean, variance) = load.prior();
-        assert!((mean - 100.0 / 120.0).abs() < 1e-12);
-        let std_share = 40.0 / 12_f64.sqrt() / 120.0;
-        assert!((variance.sqrt() / mean - std_share).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_load_is_opened_while_the_train_stands() {
-        let mut load = LoadWatch::new(&TrainKalmanSettings::default(), &train(None));
-        let opened_at: Vec<i64> = (0..60)
-            .filter(|&second| {
-                let speed_mps = if (10..40).contains(&second) { 0.0 } else { 15.0 };
-                let time_ns = second * SECOND_NS;
-                let sample = ResolvedSample { time_ns, speed_mps, ..ResolvedSample::coasting() };
-                matches!(load.see(&sample), Some(LoadChange::Opened { .. }))
-            })
-            .collect();
-        assert_eq!(opened_at, [15]);
     }
 }

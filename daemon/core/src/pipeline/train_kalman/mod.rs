@@ -20,6 +20,8 @@ pub use learned_state::declared_a_std;
 mod estimator;
 mod forces;
 mod learned_state;
+#[cfg(test)]
+mod load_tests;
 mod motion_bank;
 mod motion_filter;
 mod report;

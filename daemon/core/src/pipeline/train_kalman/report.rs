@@ -56,6 +56,8 @@ const RESISTANCE_LEVEL: Level = Level::new(0.15, 0.22);
 /// Standard deviation of the mass as a share of it. A load that changed at a stop does not make the
 /// mass unknown: its interval says how much may have boarded.
 const MASS_LEVEL: Level = Level::new(0.025, 0.12);
+/// Standard deviations beyond which a mass surely lies outside of a range.
+const SURE_STDS: f64 = 2.0;
 /// Share of w0 that a coefficient's standard deviation may reach while it counts as excited.
 const EXCITED_SHARE: f64 = 0.25;
 
@@ -105,6 +107,14 @@ impl TrainKalmanReport {
     /// True from where a load that was known may have become another one until it is known again.
     pub fn is_load_open(&self) -> bool {
         self.was_mass_known && self.mass_std_share() > self.mass.enter_below
+    }
+
+    /// Returns whether a known mass in kg surely lies outside of a range; `declared_kg` is the mass that the load factor
+    /// refers to.
+    pub fn is_mass_outside(&self, declared_kg: f64, (least_kg, most_kg): (f64, f64)) -> bool {
+        let (load, std) = (self.mean[LOAD], self.load_variance().max(0.0).sqrt());
+        let [low, high] = [load - SURE_STDS * std, load + SURE_STDS * std];
+        self.mass.is_known && (declared_kg < least_kg * low || declared_kg > most_kg * high)
     }
 
     /// The greatest standard deviation of w0 as a share of it, at the middle and near the top of the

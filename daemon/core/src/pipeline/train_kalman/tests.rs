@@ -5,7 +5,7 @@ use std::sync::Arc;
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::snapshot::packed_index;
-use dynocar_shared::{ParameterSnapshot, Quantity, Status, TrainId};
+use dynocar_shared::{ParameterSnapshot, Quantity, Reason, Status, TrainId};
 use rand::{RngExt, SeedableRng};
 
 use super::{TrainKalman, TrainKalmanSettings};
@@ -123,4 +123,24 @@ fn a_brake_that_exerts_less_than_reported_leaves_the_mass_right() {
         let mass_t = after.values[3];
         assert!((mass_t / 110.0 - 1.0).abs() < 0.01, "{share}: {mass_t}");
     }
+}
+
+#[test]
+fn a_mass_that_the_train_cannot_have_is_doubted() {
+    let answer = |tare_t: f64, full_t: f64| {
+        let train = TrainModel {
+            mass_kg: 1e3 * tare_t,
+            full_mass_kg: Some(1e3 * full_t),
+            ..TrainModel::clone(&train())
+        };
+        let mut estimator =
+            TrainKalman::new(TrainKalmanSettings::default(), &Arc::new(train)).unwrap();
+        let after = driven(&mut estimator, 0, 300);
+        assert!((after.values[3] / 110.0 - 1.0).abs() < 0.02, "{}", after.values[3]);
+        (after.status(), after.reason())
+    };
+    assert_eq!(answer(100.0, 140.0), (Status::Estimated, Some(Reason::None)));
+    assert_eq!(answer(80.0, 104.0).0, Status::Estimated, "a little crowded");
+    // Forces of some of the motors, or in another unit.
+    assert_eq!(answer(140.0, 180.0), (Status::Degraded, Some(Reason::AtBound)));
 }

@@ -26,7 +26,8 @@ impl TrainKalman {
         variance.min(monitor.effective_count() * monitor.mean_square())
     }
 
-    /// Innovations that are alike are made up for by wider intervals, up to a bound.
+    /// Innovations that are alike are made up for by wider intervals, up to a bound. Forces that fit a mass which the train
+    /// cannot have leave none.
     pub(super) fn contradiction(&self) -> Option<Reason> {
         if self.learned.monitor.are_too_large() {
             return Some(Reason::InnovationsTooLarge);
@@ -34,7 +35,14 @@ impl TrainKalman {
         let is_alike = self.learned.monitor.effective_count() >= JUDGED_MIN
             && self.learned.monitor.mean_square() >= JUDGED_SQUARE_MIN
             && self.long_run() > LONG_RUN_MAX;
-        is_alike.then_some(Reason::InnovationsNotWhite)
+        let is_outside = || {
+            let declared_kg = self.load.declared_kg(self.train_kg);
+            self.report.is_mass_outside(declared_kg, self.load.allowed_kg())
+        };
+        match is_alike {
+            true => Some(Reason::InnovationsNotWhite),
+            false => is_outside().then_some(Reason::AtBound),
+        }
     }
 
     /// The quantities known after enough motion: the mass after some seconds of traction, the resistance after a while,
