@@ -74,7 +74,7 @@ fn always_zero(
         _ => (TRACTION_ALWAYS_ZERO, "speeds up", "map the column that holds it"),
     };
     let text = format!(
-        "{quantity} is 0 in all rows, yet the train {changes} by up to {greatest_mps2:.1} m/s²: it was not \
+        "{quantity} is 0 in all rows, yet the train {changes} by more than {FORCED_MPS2} m/s²: it was not \
          recorded; {hint}"
     );
     let figures = [("quantity", quantity.name().into()), ("greatest_mps2", greatest_mps2.into())];

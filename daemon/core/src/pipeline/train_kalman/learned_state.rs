@@ -180,7 +180,7 @@ pub enum LoadChange {
 /// off.
 const OUTSIDE_RANGE_MAX: f64 = 0.12;
 /// Share by which a learned mass may differ from a weighed one: scales that are off, or a constant in their place.
-const OFF_WEIGHED_MAX: f64 = 0.25;
+const OFF_WEIGHED_MAX: f64 = 0.2;
 /// Standard deviations by which a learned mass may differ from one that is declared without a range.
 const DECLARED_STDS_MAX: f64 = 4.0;
 
