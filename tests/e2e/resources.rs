@@ -8,9 +8,9 @@ use std::time::{Duration, Instant};
 use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::TrainId;
 use dynocar_shared::services::PIPELINES_MAX;
-use dynocar_tests::process::{DaemonSite, await_true};
+use dynocar_tests::process::{DaemonSite, await_true, hosts_in, remove_segments, segments_of};
 use dynocar_transport::peer::RoleLock;
-use dynocar_transport::{Peer, Role};
+use dynocar_transport::{Host, Peer, Role};
 use rustix::process::Signal;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
@@ -245,7 +245,10 @@ fn whoever_starts_processes_takes_them_along_however_it_ends() {
         (SOAK, &["faults", "--rounds", "100"], Signal::KILL),
     ] {
         let site = DaemonSite::new();
-        let mut process = site.start(program, arguments);
+        let folder = site.path().join("temporary");
+        std::fs::create_dir(&folder).unwrap();
+        let variables = [("TMPDIR", folder.to_str().unwrap())];
+        let mut process = site.start_with(program, arguments, &variables);
         let mut children = Vec::new();
         await_true(
             || {
@@ -254,7 +257,14 @@ fn whoever_starts_processes_takes_them_along_however_it_ends() {
             },
             || format!("the children of {program} {arguments:?}: {}", process.errors()),
         );
+        let hosts = hosts_in(&folder);
         process.end(signal);
         await_true(|| !children.iter().any(is_running), || format!("the end of {children:?}"));
+        let is_empty = |host: &Host| segments_of(host).is_empty();
+        if program == DYNOCAR {
+            assert!(!hosts.is_empty(), "the demo's run-time directory");
+            await_true(|| hosts.iter().all(is_empty), || "an empty shared memory".into());
+        }
+        hosts.iter().for_each(remove_segments);
     }
 }

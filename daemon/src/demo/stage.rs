@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
 use crate::runtime::system::ends_with_this;
+use dynocar_shared::TrainId;
 use dynocar_shared::services::ROOT_VARIABLE;
+use dynocar_transport::channel::SampleCount;
 use dynocar_transport::{ChannelError, Host};
 use rustix::process::{Pid, Signal, kill_process};
 use tempfile::TempDir;
@@ -182,6 +184,8 @@ impl Drop for Stage {
             let _ = child.kill();
             let _ = child.wait();
         }
+        // Whoever uses the shared memory last removes the files of those that were killed.
+        drop(SampleCount::open(&self.host, TrainId(1)));
     }
 }
 

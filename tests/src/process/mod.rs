@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use dynocar::runtime::system::ends_with_this;
 use rustix::process::{Pid, Signal, kill_process};
 
-pub use site::DaemonSite;
+pub use site::{DaemonSite, hosts_in, remove_segments, segments_of};
 pub use terminal::{Terminal, Tie};
 
 /// Time that a test waits for an expected event before it reports a hang.

@@ -156,23 +156,56 @@ impl DaemonSite {
     ///
     /// When `/dev/shm` cannot be read.
     pub fn segments(&self) -> Vec<String> {
-        let prefix = self.host().segment_prefix();
-        std::fs::read_dir("/dev/shm")
-            .expect("/dev/shm")
-            .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
-            .filter(|name| name.starts_with(&prefix))
-            .collect()
+        segments_of(&self.host())
     }
+}
+
+/// Returns the run-time directories that programs have made in a folder and in the folders of it.
+///
+/// # Panics
+///
+/// When one cannot be used.
+pub fn hosts_in(folder: &Path) -> Vec<Host> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let of_entry = |path: PathBuf| match path.join("trains").is_dir() {
+        true => vec![Host::at(&path).expect("a run-time directory")],
+        false if path.is_dir() => hosts_in(&path),
+        false => Vec::new(),
+    };
+    entries.flat_map(|entry| of_entry(entry.path())).collect()
 }
 
 impl Drop for DaemonSite {
     fn drop(&mut self) {
-        for name in self.segments() {
-            // A file that another process removes first is gone as well.
-            let _ = std::fs::remove_file(Path::new("/dev/shm").join(name));
-        }
-        let _ = std::fs::remove_dir_all(self.host().transport_directory());
+        remove_segments(&self.host());
     }
+}
+
+/// Returns the names of the shared-memory files of a run-time directory.
+///
+/// # Panics
+///
+/// When `/dev/shm` cannot be read.
+pub fn segments_of(host: &Host) -> Vec<String> {
+    let prefix = host.segment_prefix();
+    std::fs::read_dir("/dev/shm")
+        .expect("/dev/shm")
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .filter(|name| name.starts_with(&prefix))
+        .collect()
+}
+
+/// Removes the shared-memory files of a run-time directory.
+///
+/// # Panics
+///
+/// When `/dev/shm` cannot be read.
+pub fn remove_segments(host: &Host) {
+    for name in segments_of(host) {
+        // A file that another process removes first is gone as well.
+        let _ = std::fs::remove_file(Path::new("/dev/shm").join(name));
+    }
+    let _ = std::fs::remove_dir_all(host.transport_directory());
 }
 
 const TRAIN: &str = "[train]
