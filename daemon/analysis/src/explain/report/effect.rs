@@ -280,12 +280,13 @@ fn unit_of_range(place: &Location) -> &'static str {
     match name.rsplit('_').next() {
         _ if place.speed_range_mps.is_some() => "m/s",
         Some("mps") => "m/s",
+        Some("mps2") => "m/s²",
         Some("m") => "m",
         Some("n") => "N",
         Some("s") => "s",
         Some("pa") => "Pa",
         Some("permille") => "‰",
-        Some("c") => "°C",
+        Some("degc") => "°C",
         _ => "",
     }
 }

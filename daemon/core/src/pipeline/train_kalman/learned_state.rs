@@ -191,8 +191,10 @@ pub struct LoadWatch {
     mass_std: f64,
     /// Mean and standard deviation where samples carry no mass.
     declared: (f64, f64),
-    /// Least and greatest mass in kg that the declaration allows.
-    allowed_kg: (f64, f64),
+    /// Least and greatest mass in kg by a declared range from tare to full.
+    range_kg: Option<(f64, f64)>,
+    /// Least and greatest mass in kg where nothing but one mass is declared.
+    usual_kg: (f64, f64),
     load_change_std: f64,
     /// Mass in kg that the load factor refers to; `None` before the first sample.
     declared_kg: Option<f64>,
@@ -214,17 +216,13 @@ impl LoadWatch {
         let declared = train.load_range().map_or((1.0, load_std), |(middle_kg, std_kg)| {
             (train.mass_kg / middle_kg, train.mass_kg * std_kg / (middle_kg * middle_kg))
         });
-        let (least, most) = match train.full_mass_kg {
-            Some(full_kg) => {
-                (1.0 - OUTSIDE_RANGE_MAX, (1.0 + OUTSIDE_RANGE_MAX) * full_kg / train.mass_kg)
-            }
-            None => (
-                1.0 / (1.0 + DECLARED_STDS_MAX * load_std),
-                1.0 / (1.0 - DECLARED_STDS_MAX * load_std).max(0.0),
-            ),
+        let (tare_kg, usual_std) = (train.mass_kg, DECLARED_STDS_MAX * load_std);
+        let range_of = |full_kg: f64| {
+            ((1.0 - OUTSIDE_RANGE_MAX) * tare_kg, (1.0 + OUTSIDE_RANGE_MAX) * full_kg)
         };
         LoadWatch {
-            allowed_kg: (least * train.mass_kg, most * train.mass_kg),
+            range_kg: train.full_mass_kg.map(range_of),
+            usual_kg: (tare_kg / (1.0 + usual_std), tare_kg / (1.0 - usual_std).max(0.0)),
             stops: StopWatch::new(settings.stop_min_s),
             mass_std: 0.01 * settings.mass_std_percent,
             declared,
@@ -246,12 +244,14 @@ impl LoadWatch {
     /// Returns the least and the greatest mass in kg that neither the declaration nor the samples contradict: forces that
     /// show another one are not those of the whole train, or are in another unit.
     pub fn allowed_kg(&self) -> (f64, f64) {
-        let (mut least_kg, mut most_kg) = self.allowed_kg;
-        if let Some(weighed_kg) = self.declared_kg.filter(|_| self.is_weighed) {
-            least_kg = least_kg.max((1.0 - OFF_WEIGHED_MAX) * weighed_kg);
-            most_kg = most_kg.min((1.0 + OFF_WEIGHED_MAX) * weighed_kg);
+        let weighed_kg = self.declared_kg.filter(|_| self.is_weighed);
+        let near = |kg: f64| ((1.0 - OFF_WEIGHED_MAX) * kg, (1.0 + OFF_WEIGHED_MAX) * kg);
+        match (self.range_kg, weighed_kg.map(near)) {
+            (Some(range), Some(near)) => (range.0.max(near.0), range.1.min(near.1)),
+            // A weighed train of any number of wagons has little to do with the one mass of its file.
+            (Some(one), None) | (None, Some(one)) => one,
+            (None, None) => self.usual_kg,
         }
-        (least_kg, most_kg)
     }
 
     /// Mass in kg that the load factor refers to; the declared one before the first sample.

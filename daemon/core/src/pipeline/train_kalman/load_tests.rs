@@ -97,6 +97,7 @@ fn a_mass_is_allowed_between_tare_and_full_near_the_weighed_one_or_a_wide_way_of
     assert_eq!(allowed(&train(Some(140e3)), Some(120e3)), [96, 144]);
     assert_eq!(allowed(&train(None), None), [63, 250]);
     assert_eq!(allowed(&train(None), Some(120e3)), [96, 144]);
+    assert_eq!(allowed(&train(None), Some(500e3)), [400, 600], "more wagons than declared");
 }
 
 #[test]
