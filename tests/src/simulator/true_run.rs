@@ -2,6 +2,7 @@
 
 use dynocar_model::simulate::motion::autoregressed;
 use dynocar_model::simulate::motion::{SimulatedMotion, advance};
+use dynocar_model::terms::delay::DelayLine;
 use dynocar_model::train::TrainModel;
 
 use super::actuators::{Actuators, LateForces};
@@ -59,7 +60,7 @@ pub fn drive_run(physics: &TruePhysics<'_>, settings: &SimulatorSettings) -> Vec
     let mut actuators = Actuators::new(train, plan.mass_kg, TRUE_STEP_S, held_n);
     let mut late = LateForces::new(disturbances.delay_s, disturbances.lag_s, TRUE_STEP_S, held);
     let [brake_delay_s, brake_lag_s] = disturbances.brake_late_s;
-    let mut late_brake = LateForces::new(brake_delay_s, brake_lag_s, TRUE_STEP_S, held);
+    let mut late_brake = DelayLine::new(brake_delay_s, brake_lag_s);
     let mut slip = WheelSlip::new(settings, stream(Stream::Slip(plan.number)));
     let mut weather = Weather::new(physics, stream(Stream::Gusts(plan.number)));
     let mut motion = SimulatedMotion { distance_m: 0.0, speed_mps: 0.0 };
@@ -82,7 +83,9 @@ pub fn drive_run(physics: &TruePhysics<'_>, settings: &SimulatorSettings) -> Vec
         let (headwind_mps, temperature_degc) = weather.advance();
         let mass_kg = plan.mass_kg * disturbances.mass_factor(time_s, position_m);
         let now = SimulatedMoment { time_s, headwind_mps, temperature_degc, mass_kg };
-        let brake_force_n = late_brake.advance(forces).brake_force_n;
+        let at = ((time_s * 1e9).round() as i64, 0);
+        let late_brake_n = late_brake.acting(at, Some([forces.brake_force_n]));
+        let brake_force_n = late_brake_n.map_or(forces.brake_force_n, |[force_n]| force_n);
         let mut acting = late.advance(Controls { brake_force_n, ..forces });
         if let Some(cap) = &disturbances.adhesion {
             let weight_n = 1000.0 * TrainModel::weight_kn(mass_kg);

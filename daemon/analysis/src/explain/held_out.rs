@@ -1,7 +1,7 @@
 //! Confirmation of effects by the holdout runs: whether they act in them too, and how large they are there.
 //!
-//! The fit runs contribute their information on a, b, c and the usual errors, and none on the effect itself: its
-//! numbers follow from the normal equations of the holdout runs and from that information.
+//! The fit runs contribute what they know of all other numbers, as surely as the answer states these, and nothing on the
+//! effect itself: its numbers follow from the normal equations of the holdout runs and from that information.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -9,7 +9,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::evidence::{Fit, FitProblem, Positions, RunData, RunNormal, RunPositions};
 use super::over_time::is_one_in_all_runs;
 use super::score::RunScore;
-use super::selection::{SearchOutcome, enlarged_by_scatter, std_with_forms};
+use super::selection::{Deviations, SearchOutcome, enlarged_by_scatter, std_with_forms};
 
 /// Least number of runs that can confirm an effect.
 const RUNS_MIN: usize = 8;
@@ -60,23 +60,23 @@ pub struct HeldOutEffect {
     pub runs: usize,
     /// All parameters of the model, the effect's own as in these runs.
     pub theta: Vec<f64>,
-    /// Their standard deviations.
-    pub std: Vec<f64>,
-    /// Their covariance, without the share of the forms of effects.
-    pub covariance: DMatrix<f64>,
+    /// How surely they are known.
+    pub deviations: Deviations,
     /// Probability that the effect's numbers differ as much from those of the fit runs where they are the same.
     pub p_value: f64,
 }
 
 /// Returns the numbers of each of the first `count` effects of a model by the holdout runs; `None` for an effect that
-/// acts in some runs only or has more than two numbers, and where these runs hardly show it.
+/// acts in some runs only or has more than two numbers, and where these runs hardly show it. `fitted` are the deviations
+/// by the fit runs, whose samples are some s apart, as those of the holdout runs are.
 pub fn by_held_out_runs(
     (problem, fit): (&FitProblem, &Fit),
     runs: &[HeldOutRun],
-    covariance: &DMatrix<f64>,
+    (fitted, step_s): (&Deviations, f64),
     count: usize,
 ) -> Vec<Option<HeldOutEffect>> {
     let (theta, model) = (&fit.theta, &fit.model);
+    let by_fit_runs = as_surely_as_stated(fit, &fitted.std);
     let mut own = RunNormal::none(theta.len());
     let evidence: Vec<&(RunNormal, Vec<RunPositions>)> =
         runs.iter().filter_map(|run| run.evidence.as_ref()).collect();
@@ -89,22 +89,37 @@ pub fn by_held_out_runs(
             return None;
         }
         let (start, size) = (range.start, range.len());
-        let information = &own.information + without(&fit.information(), start, size)?;
+        let information = &own.information + without(by_fit_runs.as_ref()?, start, size)?;
         let step = problem.step_from(fit, &information, &own.score)?;
         let factor = Cholesky::new(information.clone())?;
         let left: Vec<RunNormal> = evidence.iter().map(|it| it.0.moved_by(&step)).collect();
         let known = enlarged_by_scatter(&factor.inverse(), &information, &left);
         let [fitted, held_out] =
-            [covariance, &known].map(|all| all.view((start, start), (size, size)).into_owned());
+            [&fitted.covariance, &known].map(|all| all.view((start, start), (size, size)).into_owned());
         let is_shown = held_out.trace() < DEVIATION_TIMES_MAX.powi(2) * fitted.trace();
         let apart = step.rows(start, size).into_owned();
         let p_value = chance(&apart, &(fitted + held_out))?;
         let theta: Vec<f64> = theta.iter().zip(&step).map(|(value, step)| value + step).collect();
         let std = std_with_forms(&known, model, &theta);
+        let mut deviations = Deviations { std, covariance: known, c: theta[2] };
+        deviations.add_shared_errors(problem, model, &theta, step_s);
         let runs = positions.len();
-        is_shown.then_some(HeldOutEffect { runs, theta, std, covariance: known, p_value })
+        is_shown.then_some(HeldOutEffect { runs, theta, deviations, p_value })
     };
     (0..count).map(of_effect).collect()
+}
+
+/// Returns the information of a fit, weakened until its first parameters are known by their stated standard deviations:
+/// the scatter between the runs, the map and the forms of effects leave them less sure than its likelihood does.
+fn as_surely_as_stated(fit: &Fit, std: &[f64]) -> Option<DMatrix<f64>> {
+    let mut information = fit.information();
+    let likelihood = Cholesky::new(information.clone())?.inverse();
+    for (i, std) in std.iter().enumerate() {
+        let weaker = (likelihood[(i, i)].sqrt() / std).min(1.0);
+        information.row_mut(i).scale_mut(weaker);
+        information.column_mut(i).scale_mut(weaker);
+    }
+    Some(information)
 }
 
 /// Returns the information with `size` parameters from `start` on marginalised out.

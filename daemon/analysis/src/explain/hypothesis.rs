@@ -339,7 +339,7 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
     }
 
     /// Returns the standard deviation of each parameter by the unknown course between samples `_step_s` seconds
-    /// apart.
+    /// apart; two parameters err by it in opposite ways.
     fn sampling_error(&self, _step_s: f64) -> f64 {
         0.0
     }

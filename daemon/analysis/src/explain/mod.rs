@@ -139,7 +139,8 @@ fn explained<E: From<RunDataError> + Send>(
         None => false,
     };
     let seen = if is_joined { Density::Recorded } else { density };
-    let deviations = selection::deviations_given(&problem, &outcome, seen.step_s(recorded_step_s));
+    let step_s = seen.step_s(recorded_step_s);
+    let deviations = selection::deviations_given(&problem, &outcome, step_s);
     progress(0.95, "scoring the holdout runs");
     let judged = judged(many.as_ref(), &search, &preparation, &outcome)?;
     let scores = judged.iter().map(|run| run.score.clone()).collect();
@@ -154,7 +155,7 @@ fn explained<E: From<RunDataError> + Send>(
     let held_out = held_out::by_held_out_runs(
         (&problem, finished),
         &judged,
-        &deviations.covariance,
+        (&deviations, step_s),
         known.len(),
     );
     let known = caveats::FinishedFit {

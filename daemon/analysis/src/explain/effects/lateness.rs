@@ -17,8 +17,9 @@ pub fn late_from(starts_s: &[[f64; 2]], decrease: impl Fn([f64; 2]) -> f64) -> V
     best.filter(|(decrease, _)| *decrease > 0.0).map_or(NEAR_NONE_S, |(_, start_s)| start_s).into()
 }
 
-/// Returns the standard deviation in s of a dead time and of a lag by the sampling step. Forces are taken to change
-/// evenly between samples, so that each of the two may be wrong by any part of a step; their sum is known better.
+/// Returns the standard deviation in s of a dead time, and of a lag that is as much shorter as this is longer, by the
+/// sampling step. Forces are taken to change evenly between samples, so that each of the two may be wrong by any part of
+/// a step; their sum, the mean lateness, is not.
 pub fn late_by_sampling_s(step_s: f64) -> f64 {
     step_s / 12_f64.sqrt()
 }

@@ -99,10 +99,38 @@ pub fn few_runs_factor(runs: usize) -> f64 {
 pub struct Deviations {
     /// Standard deviations, of which 1.96 make a 95 % interval.
     pub std: Vec<f64>,
-    /// Covariance by likelihood and scatter, without the shares of the form and the map.
+    /// Covariance by likelihood, scatter and sampling, without the shares of the forms and the map.
     pub covariance: DMatrix<f64>,
     /// c of the same fit, to which an effect refers that is a share of c.
     pub c: f64,
+}
+
+impl Deviations {
+    /// Adds the errors that runs with samples some s apart share, so that more of them do not take these away: of the
+    /// form of a, b and c, and of the unknown course between samples. `theta` begins with a, b and c.
+    pub fn add_shared_errors(
+        &mut self,
+        problem: &FitProblem,
+        model: &UpdatedModel,
+        theta: &[f64],
+        step_s: f64,
+    ) {
+        let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
+        if let Some(floor) = davis_form_std(problem, davis) {
+            self.std.iter_mut().zip(floor).for_each(|(std, floor)| *std = std.hypot(floor));
+        }
+        for (effect, range) in model.effects.iter().zip(model.ranges()) {
+            let split = effect.sampling_error(step_s);
+            for i in range.clone() {
+                self.std[i] = self.std[i].hypot(split);
+                for j in range.clone() {
+                    // A dead time that is longer by this leaves a lag that is shorter by as much.
+                    let sign = if i == j { 1.0 } else { -1.0 };
+                    self.covariance[(i, j)] += sign * split * split;
+                }
+            }
+        }
+    }
 }
 
 /// Standard deviations of all parameters, and their covariance.
@@ -215,7 +243,7 @@ type SpeedClasses = Vec<(f64, f64)>;
 /// A train's resistance is only nearly a + b v + c v²: its mass is not spread evenly, and gradients change between the
 /// places that a map states. The forces that the form leaves out at some speeds are the same in every run, a, b and c
 /// take them up, and no number of runs averages that out.
-pub fn davis_form_std(problem: &FitProblem, davis: Davis) -> Option<[f64; 3]> {
+fn davis_form_std(problem: &FitProblem, davis: Davis) -> Option<[f64; 3]> {
     let bins = problem.runs.iter().flat_map(|run| &run.bins);
     form_std(&classes(bins.map(|bin| bin.speed_mps)), davis)
 }

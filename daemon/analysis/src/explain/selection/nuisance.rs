@@ -6,14 +6,13 @@
 
 use std::sync::Arc;
 
-use dynocar_model::train::Davis;
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::acceptance::{
     CERTAIN_RUNS_MIN, is_certain, is_left_by_moved_places, is_material, is_possible, moves_places,
 };
-use super::deviations::{Deviations, davis_form_std, deviations, deviations_with_nuisance};
+use super::deviations::{Deviations, deviations, deviations_with_nuisance};
 use super::outcome::{
     EffectTrial, NuisanceFit, Refusal, SearchOutcome, at_bound, penalty, round_of,
 };
@@ -230,21 +229,11 @@ pub fn move_to_nuisance_fit(search: &Search, outcome: &mut SearchOutcome) {
 }
 
 /// Standard deviations of the parameters of a model that was moved with the usual errors last, from samples some s
-/// apart. Those of a, b and c are no less than their form allows.
+/// apart, with the errors that all runs share.
 pub fn deviations_given(problem: &FitProblem, outcome: &SearchOutcome, step_s: f64) -> Deviations {
     let count = outcome.fit.theta.len();
     let Some((_, joint)) = &outcome.nuisance_fit else { return deviations(&outcome.fit) };
     let mut deviations = deviations_with_nuisance(&joint.fit, count, joint.shared);
-    let theta = &joint.fit.theta;
-    let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
-    if let Some(floor) = davis_form_std(problem, davis) {
-        deviations.std.iter_mut().zip(floor).for_each(|(std, floor)| *std = std.hypot(floor));
-    }
-    let model = &outcome.fit.model;
-    for (effect, range) in model.effects.iter().zip(model.ranges()) {
-        for std in &mut deviations.std[range.clone()] {
-            *std = std.hypot(effect.sampling_error(step_s));
-        }
-    }
+    deviations.add_shared_errors(problem, &outcome.fit.model, &joint.fit.theta, step_s);
     deviations
 }
