@@ -674,7 +674,8 @@ typedef struct dynocar_stopping {
 
 /* Distance and time of a stop. confidence: 0.5 up to below 1, for the bound, which moves every
  * uncertain quantity to its unfavourable side. effort: 1 to 1024 points.
- * DYNOCAR_ERROR_DOES_NOT_STOP when the train would not slow down. REAL-TIME */
+ * DYNOCAR_ERROR_DOES_NOT_STOP when the train would not slow down; DYNOCAR_ERROR_BAD_NUMBER also for
+ * a mass_kg that the brake alone would decelerate by more than 10 m/s² (a mass in t). REAL-TIME */
 dynocar_code dynocar_stopping_estimate(const dynocar_stop *stop,
                                        const dynocar_effort_point *effort, size_t effort_count,
                                        double confidence, dynocar_stopping *stopping);

@@ -214,6 +214,8 @@ impl core::error::Error for StoppingError {}
 
 /// Longest part of a response in s; a freight train of 2 km takes about 90.
 const RESPONSE_MAX_S: f64 = 300.0;
+/// No brake decelerates by more, whatever carries it: the mass is in t, or the forces in another unit than N.
+const DECELERATION_MAX_MPS2: f64 = 10.0;
 
 /// How far each uncertain quantity is moved to its unfavourable side, in standard deviations.
 #[derive(Clone, Copy)]
@@ -234,8 +236,9 @@ impl Stop<'_> {
     ///
     /// # Errors
     ///
-    /// When an input is not finite or out of range, `confidence` is not inside 0.5 to 1, or the
-    /// train does not slow down.
+    /// When an input is not finite or out of range, the mass is so small that the brake alone
+    /// would decelerate it by more than 10 m/s² (a mass in t), `confidence` is not inside 0.5 to
+    /// 1, or the train does not slow down.
     ///
     /// # Real-time
     ///
@@ -314,7 +317,11 @@ impl Stop<'_> {
             let speed_mps = pair[1].speed_mps;
             require(pair[0].speed_mps < speed_mps, "brake_effort", speed_mps)?;
         }
-        Ok(())
+        let forces_n = self.brake_effort.iter().map(|point| point.force_n);
+        let greatest_n = self.brake_scale.value * forces_n.fold(0.0, f64::max);
+        let is_possible = self.adhesion != RailAdhesion::Unlimited
+            || greatest_n <= DECELERATION_MAX_MPS2 * self.mass_kg;
+        require(is_possible, "mass_kg", self.mass_kg)
     }
 }
 

@@ -151,6 +151,11 @@ fn bad_input_is_named() {
     assert_eq!(named(Stop { from_speed_mps: f64::NAN, ..good }), "from_speed_mps");
     assert_eq!(named(Stop { to_speed_mps: 50.0, ..good }), "from_speed_mps");
     assert_eq!(named(Stop { mass_kg: 0.0, ..good }), "mass_kg");
+    let in_t = Stop { mass_kg: 100.0, ..good };
+    assert_eq!(named(in_t), "mass_kg");
+    // The adhesion limits the deceleration, whatever the brake's force.
+    let carried = RailAdhesion::Coefficient(Uncertain::exact(0.1));
+    assert!(Stop { adhesion: carried, ..in_t }.estimate(0.95).is_ok());
     assert_eq!(named(Stop { brake_effort: &[], ..good }), "brake_effort");
     assert_eq!(named(Stop { brake_scale: Uncertain::new(1.0, f64::NAN), ..good }), "brake_scale");
     let backwards = [effort[0], EffortPoint { speed_mps: -1.0, force_n: 0.0 }];
