@@ -12,6 +12,7 @@ mod fits;
 mod force_sampling;
 mod many_runs;
 mod modulated_stops;
+mod other_lines;
 mod parts;
 mod physics;
 mod places;

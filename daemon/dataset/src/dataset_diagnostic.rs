@@ -2,7 +2,9 @@
 //! the train and the line that cannot be true.
 
 use dynocar_core::plausibility::window_balance::WindowBalance;
-use dynocar_core::plausibility::{DetectedFault, Severity, gradient_fault};
+use dynocar_core::plausibility::{
+    DetectedFault, Severity, gradient_fault, mirrored_line, other_line,
+};
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use dynocar_model::train::numbers::LENGTH;
@@ -105,7 +107,8 @@ pub fn diagnostics<'r>(
     for (index, detected, read_as, range) in faults {
         diagnostics[index].text = detected.words_for(range, &read_as);
     }
-    diagnostics.extend(all.gradient_scale());
+    let of_line = all.mirrored_line().or_else(|| all.gradient_scale());
+    diagnostics.extend(of_line.or_else(|| all.other_line()));
     diagnostics.sort_by_key(|diagnostic| std::cmp::Reverse(diagnostic.severity));
     diagnostics
 }
@@ -114,6 +117,7 @@ pub fn diagnostics<'r>(
 #[derive(Default)]
 struct AllRuns {
     balance: Option<(WindowBalance, Unit)>,
+    mirrored: Option<WindowBalance>,
     files: Vec<String>,
     has_fault: bool,
 }
@@ -122,16 +126,46 @@ impl AllRuns {
     fn push(&mut self, run: &Run) {
         let of_all = || (WindowBalance::of_all(), run.gradient_unit);
         self.balance.get_or_insert_with(of_all).0.add(&run.balance);
+        self.mirrored.get_or_insert_with(WindowBalance::of_all).add(&run.mirrored);
         self.files.push(run.file.clone());
         self.has_fault |= run.diagnostics.iter().any(|it| it.fault.is_some());
     }
 
     /// Returns that the gradients are in another unit, where no run shows a fault by itself.
-    fn gradient_scale(self) -> Option<DatasetDiagnostic> {
+    fn gradient_scale(&self) -> Option<DatasetDiagnostic> {
         let (balance, read_as) = self.balance.filter(|_| !self.has_fault)?;
-        let found = Diagnostic::of_fault(gradient_fault(&balance)?, read_as);
+        Some(self.of_all(Diagnostic::of_fault(gradient_fault(&balance)?, read_as)))
+    }
+
+    /// Returns that the line is described from its other end.
+    fn mirrored_line(&self) -> Option<DatasetDiagnostic> {
+        let factor = mirrored_line(&self.balance?.0, &self.mirrored?)?;
+        let sign = if factor < 0.0 { ", with the other sign" } else { "" };
+        let text = format!(
+            "the train moves as on the line's gradients read from its other end{sign}: do the chainages of the \
+             track and the positions of the runs begin at the same end?"
+        );
+        let figures = [("factor", factor.into())];
+        Some(self.of_all(Diagnostic::new("mirrored_line", Severity::Fundamental, text, figures)))
+    }
+
+    /// Returns that the line is another one, where no run shows a fault that would hide it.
+    fn other_line(&self) -> Option<DatasetDiagnostic> {
+        let is_mapped = self.mirrored.is_some_and(|it| it.windows() > 0.0);
+        let (balance, _) = self.balance.filter(|_| is_mapped && !self.has_fault)?;
+        let share = other_line(&balance)?;
+        let text = format!(
+            "of the track's gradients, {:.1} ‰ on average, hardly any shows in the motion of the train: is it the line \
+             of these runs, and do its chainages and the positions count from the same place?",
+            balance.gradient_rms_permille()
+        );
+        let figures = [("share", share.into())];
+        Some(self.of_all(Diagnostic::new("other_line", Severity::Warning, text, figures)))
+    }
+
+    fn of_all(&self, found: Diagnostic) -> DatasetDiagnostic {
         let Diagnostic { code, severity, text, .. } = found;
-        Some(DatasetDiagnostic { code, severity, runs: self.files, text })
+        DatasetDiagnostic { code, severity, runs: self.files.clone(), text }
     }
 }
 

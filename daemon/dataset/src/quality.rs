@@ -1,19 +1,24 @@
 //! Quality of a run's data: counts, ranges, the train's motion, and the refusals by the admission that also checks live
 //! samples.
 
+use std::sync::Arc;
+
 use dynocar_core::pipeline::admission::Admission;
 use dynocar_core::pipeline::{Echo, Outcome};
-use dynocar_core::plausibility::window_balance::WindowBalance;
+use dynocar_core::plausibility::window_balance::{WindowBalance, WindowMean};
 use dynocar_core::plausibility::{DetectedFaults, gradient_fault};
 use dynocar_model::force::ForceResolver;
 use dynocar_model::terms::wheel::STILL_MPS;
+use dynocar_model::track::Track;
+use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{RejectionReason, SampleField, TrainSample};
 use serde::{Serialize, Serializer};
 
 use super::forces::Force;
 use super::order::{OrderCounts, pairs};
 use super::quantity::Quantity;
-use super::resolved::{Context, DATASET_TRAIN, Resolved};
+use super::resolved::{Context, DATASET_TRAIN, GradientSource, Resolved};
+use super::speed_and_position::PositionSource;
 use super::table::LineCounts;
 
 /// Share of the greatest force below which a force counts as zero.
@@ -255,6 +260,7 @@ pub(super) struct Judge {
     admission: Admission,
     resolver: ForceResolver,
     balance: WindowBalance,
+    mirrored: Option<MirroredLine>,
     rows: usize,
     /// How many samples are refused for each reason, and the row of the first.
     refused: [(usize, usize); RejectionReason::ALL.len()],
@@ -262,13 +268,18 @@ pub(super) struct Judge {
 
 impl Judge {
     /// Returns a judge that has seen no sample of its run.
-    pub fn new(context: Context, is_position_recorded: bool) -> Self {
+    pub fn new(context: Context, run: &Resolved) -> Self {
+        let is_position_recorded = run.position_source == PositionSource::Column;
         let mut admission = Admission::new(DATASET_TRAIN, context.train.clone());
         admission.set_position_measured(is_position_recorded);
+        let is_mapped = is_position_recorded && run.gradient_source == GradientSource::Track;
+        let mirrored = context.track.filter(|_| is_mapped);
         Judge {
             admission,
             resolver: ForceResolver::new(context.train.clone(), context.track.cloned()),
             balance: WindowBalance::of_all(),
+            mirrored: mirrored
+                .and_then(|track| MirroredLine::new(track.clone(), context.train.length_m)),
             rows: 0,
             refused: [(0, 0); RejectionReason::ALL.len()],
         }
@@ -283,8 +294,12 @@ impl Judge {
             *count += 1;
         }
         self.rows += 1;
-        if let Some(window) = self.admission.ended_window() {
+        let window = self.admission.ended_window();
+        if let Some(window) = window {
             self.balance.push(window);
+        }
+        if let Some(mirrored) = &mut self.mirrored {
+            mirrored.take(sample, window);
         }
     }
 
@@ -304,11 +319,49 @@ impl Judge {
         self.balance
     }
 
+    /// Returns the same with the gradients of the line read from its other end; no window where that is not known.
+    pub fn mirrored(&self) -> WindowBalance {
+        self.mirrored.as_ref().map_or_else(WindowBalance::of_all, |mirrored| mirrored.balance)
+    }
+
     /// Returns the reasons for which validation refuses samples, how many, and the row of the first.
     pub fn refused(&self) -> impl Iterator<Item = (RejectionReason, usize, usize)> {
         let counts = RejectionReason::ALL.iter().copied().zip(self.refused);
         counts
             .filter(|(_, (count, _))| *count > 0)
             .map(|(reason, (count, row))| (reason, count, row))
+    }
+}
+
+/// How forces and accelerations go together with the gradients of a line that is read from its other end.
+struct MirroredLine {
+    track: Arc<Track>,
+    line_m: f64,
+    train_m: f64,
+    /// Position in m where the present window began.
+    from_m: Option<f64>,
+    balance: WindowBalance,
+}
+
+impl MirroredLine {
+    /// Returns one without windows, for a train of a length in m; `None` for a line of unknown length.
+    fn new(track: Arc<Track>, train_m: f64) -> Option<Self> {
+        let (line_m, balance) = (track.length_m?, WindowBalance::of_all());
+        Some(MirroredLine { track, line_m, train_m, from_m: None, balance })
+    }
+
+    /// Takes in a sample, with the means of the window of motion that it ended.
+    fn take(&mut self, sample: &TrainSample, window: Option<&WindowMean>) {
+        let position_m = sample.get(SampleField::Position);
+        if let (Some(window), Some(from_m), Some(to_m)) = (window, self.from_m, position_m) {
+            let middle_m = self.line_m - 0.5 * (from_m + to_m);
+            let permille = self.track.gradient_permille(middle_m, self.train_m).unwrap_or(0.0);
+            let climb = -1e-3 * f64::from(sample.direction) * permille;
+            let gradient_mps2 = STANDARD_GRAVITY_MPS2 * climb;
+            self.balance.push(&WindowMean { gradient_mps2, ..*window });
+        }
+        if window.is_some() || self.from_m.is_none() {
+            self.from_m = position_m;
+        }
     }
 }

@@ -79,6 +79,8 @@ pub struct Run {
     pub brake_source: ForceSource,
     /// How forces, gradients and accelerations go together over all of it.
     pub balance: WindowBalance,
+    /// The same with the gradients of the line read from its other end, where positions and the line's length are known.
+    pub mirrored: WindowBalance,
     /// The unit in which its gradients were read.
     pub gradient_unit: Unit,
     /// Quality of the data.
@@ -223,7 +225,7 @@ pub(super) fn read(
             column(Quantity::Time)
         )));
     }
-    let mut judge = Judge::new(context, resolved.position_source == PositionSource::Column);
+    let mut judge = Judge::new(context, &resolved);
     let samples: Vec<TrainSample> =
         resolved.samples(number, context.train).inspect(|sample| judge.take(sample)).collect();
     let quality = quality::assess(&resolved, &samples, &judge);
@@ -247,6 +249,7 @@ pub(super) fn read(
         brake_source: resolved.forces.brake.source,
         samples,
         balance: judge.balance(),
+        mirrored: judge.mirrored(),
         gradient_unit: read_as(context.manifest, InputFault::GradientScale),
         quality,
         diagnostics,

@@ -52,6 +52,7 @@ pub fn caveats(
 ) -> Vec<String> {
     let contradictions = effects.iter().filter_map(|effect| effect.contradiction.clone());
     let mut caveats: Vec<String> = contradictions.map(|it| format!(" {it}")).collect();
+    caveats.dedup();
     let courses = known.courses.iter().flat_map(|(kind, all)| {
         all.iter().map(|course| format!(" {}", course.sentence(kind.name())))
     });

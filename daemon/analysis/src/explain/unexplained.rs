@@ -12,6 +12,9 @@ const OVER_S: f64 = 60.0;
 /// explain --verbose`).
 const NOISE_SHARE_MAX: f64 = 0.3;
 
+/// Least share of the basic resistance from which a force without a cause outweighs the causes that are found.
+const OUTWEIGHS_SHARE: f64 = 1.0;
+
 /// Residual of the finished model.
 pub struct Unexplained {
     /// Standard deviation in N/kN of the remaining force, averaged over a minute.
@@ -49,6 +52,15 @@ impl Unexplained {
     /// Returns whether noise explains it.
     pub fn is_noise(&self) -> bool {
         self.share < NOISE_SHARE_MAX
+    }
+
+    /// Returns what it says against effects found where it is as large as the basic resistance itself, as on another line
+    /// than that of the runs: they take up some of it.
+    pub fn contradiction(&self) -> Option<&'static str> {
+        (self.share >= OUTWEIGHS_SHARE).then_some(
+            "The force without a cause outweighs all that is found: check first that the line, the train and the runs \
+             belong together, and change no part before the cause is known.",
+        )
     }
 
     /// It in words.

@@ -46,12 +46,15 @@ pub fn answer(
     // The coefficients of the updated model predict best without the usual errors, and make up for these.
     let joint = outcome.nuisance_fit();
     let davis = &joint.as_ref().map_or(fit, |joint| &joint.fit).theta;
-    let effects = effect_answers(search, outcome, known);
+    let mut effects = effect_answers(search, outcome, known);
     // An effect without a name has no competing hypotheses either.
     let is_unknown = fit.model.has(EffectKind::Unknown);
     let competing = if is_unknown { Vec::new() } else { competing_hypotheses(search, outcome) };
     let left = Unexplained::new(search, outcome);
     let verdict = verdict(search, outcome, &competing, left.as_ref());
+    if let Some(words) = left.as_ref().and_then(Unexplained::contradiction) {
+        effects.iter_mut().for_each(|effect| effect.contradiction = Some(words.into()));
+    }
     let is_enough = verdict != Verdict::InsufficientData;
     let identifiability = if is_enough { identifiability(search, outcome) } else { Vec::new() };
     let [rmse_before, rmse_after] = score.holdout_rmse_mps();
@@ -211,12 +214,13 @@ fn held_out_answer(
     range: Range<usize>,
     stated: ReportContext,
 ) -> HeldOutAnswer {
+    let Deviations { std, covariance, c } = &held_out.deviations;
     let ReportedValues { values, deviations } = effect.report(&ReportContext {
         parameters: &held_out.theta[range.clone()],
-        deviations: &held_out.std[range],
-        c: held_out.theta[2],
-        c_deviation: held_out.std[2],
-        covariance: &held_out.covariance,
+        deviations: &std[range],
+        c: *c,
+        c_deviation: std[2],
+        covariance,
         ..stated
     });
     let (runs, p_value) = (held_out.runs, held_out.p_value);

@@ -53,6 +53,13 @@ const ALL_DEVIATIONS_MIN: f64 = 20.0;
 /// Gradients at a wrong place or with noise look too large, too, but leave all of the scatter of the true gradients
 /// that they do not explain; a wrong unit leaves less than this share of it.
 const SCATTER_SHARE_MAX: f64 = 0.4;
+/// A line that is read from its right end leaves less than this share of the scatter that it leaves from the wrong one.
+const MIRRORED_SCATTER_MAX: f64 = 0.7;
+/// Of the gradients (root mean square in ‰) of another line, the motion shows less than this share, with so many
+/// standard deviations.
+const OTHER_LINE_PERMILLE_MIN: f64 = 2.0;
+const OTHER_LINE_SHARE_MAX: f64 = 0.5;
+const OTHER_LINE_DEVIATIONS: f64 = 4.0;
 /// The least mean pressure in Pa of applied brakes; a pressure that is too high is out of range.
 const BRAKING_PRESSURE_MIN_PA: f64 = 5e3;
 /// An ordinary mean pressure in Pa of applied brakes.
@@ -227,6 +234,29 @@ pub fn gradient_fault(all: &WindowBalance) -> Option<DetectedFault> {
     let left_mps2 = of_gradients_mps2 * (1.0 - factor * factor).max(0.0).sqrt();
     let is_scale = factor > 1.0 || scatter_mps2 < SCATTER_SHARE_MAX * left_mps2;
     is_scale.then_some(DetectedFault { fault: InputFault::GradientScale, factor: 1.0 / factor })
+}
+
+/// Judges whether all runs pass a line that is described from its other end; `mirrored` holds the same windows with
+/// gradients that are read so. Returns the factor of these, which is below 0 where their sign is reversed, too.
+pub fn mirrored_line(all: &WindowBalance, mirrored: &WindowBalance) -> Option<f64> {
+    let ([.., own], [.., other]) = (all.fit()?, mirrored.fit()?);
+    let is_like_gradients = other.is_known(ALL_DEVIATIONS_MIN)
+        && !is_outside(other.factor.abs(), GRADIENT_FACTORS)
+        && mirrored.windows() >= ALL_WINDOWS_MIN;
+    let explains_more = other.scatter_mps2 < MIRRORED_SCATTER_MAX * own.scatter_mps2;
+    (is_like_gradients && explains_more).then_some(other.factor)
+}
+
+/// Judges whether all runs pass another line, or the line at quite another place: returns the share of its gradients that
+/// their motion shows, where that is little.
+pub fn other_line(all: &WindowBalance) -> Option<f64> {
+    let [.., gradient] = all.fit()?;
+    let FittedFactor { factor, std, .. } = gradient;
+    let is_much = factor.abs() + OTHER_LINE_DEVIATIONS * std > OTHER_LINE_SHARE_MAX;
+    let is_shown = all.windows() >= ALL_WINDOWS_MIN
+        && gradient.is_alone()
+        && all.gradient_rms_permille() > OTHER_LINE_PERMILLE_MIN;
+    (is_shown && !is_much).then_some(factor)
 }
 
 /// Returns the factor of units that brings a pressure next to an ordinary one.

@@ -61,9 +61,14 @@ pub struct FittedFactor {
 }
 
 impl FittedFactor {
+    /// Returns whether the other quantities leave enough of the quantity's scatter to tell it from them.
+    pub fn is_alone(&self) -> bool {
+        self.own_share > OWN_SHARE_MIN
+    }
+
     /// Returns whether the motion determines the factor, at least this number of standard deviations away from 0.
     pub fn is_known(&self, deviations: f64) -> bool {
-        self.own_share > OWN_SHARE_MIN && self.factor.abs() > deviations * self.std
+        self.is_alone() && self.factor.abs() > deviations * self.std
     }
 }
 

@@ -181,7 +181,7 @@ pub fn sureness(p_value: f64) -> String {
 /// Returns the recommended action for an effect; `None` for one without a name.
 pub fn to_do(effect: &EffectAnswer) -> Option<&'static str> {
     if effect.contradiction.is_some() {
-        return Some("find out which of the two is wrong before anything is replaced");
+        return Some("find out what is wrong before anything is replaced");
     }
     let kind = EffectKind::from_name(effect.kind).filter(|kind| *kind != EffectKind::Unknown)?;
     Some(KindRow::of(kind).to_do)
