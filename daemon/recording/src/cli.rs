@@ -103,9 +103,9 @@ fn lost((path, ending): (&PathBuf, &FileEnding)) -> Option<String> {
 impl From<RecordError> for Failure {
     fn from(error: RecordError) -> Self {
         match error {
-            RecordError::Taken { .. } | RecordError::Ring(KeepError::Taken { .. }) => {
-                Failure::input(error)
-            }
+            RecordError::Taken { .. }
+            | RecordError::Folder { .. }
+            | RecordError::Ring(KeepError::Taken { .. }) => Failure::input(error),
             error => Failure::work(error),
         }
     }

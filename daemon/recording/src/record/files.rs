@@ -259,7 +259,8 @@ fn open(
 ) -> Result<(RecordingWriter<Counted>, Rc<Cell<u64>>), RecordError> {
     let file = storage.create(path).map_err(|error| match error.kind() {
         ErrorKind::AlreadyExists => RecordError::Taken { path: path.into() },
-        _ => RecordError::Write { path: path.into(), source: error.into() },
+        ErrorKind::IsADirectory => RecordError::Folder { path: path.into() },
+        _ => RecordError::Unmade { path: path.into(), source: error },
     })?;
     let bytes = Rc::new(Cell::new(0));
     let counted = Counted { file, bytes: Rc::clone(&bytes) };

@@ -64,6 +64,20 @@ pub enum RecordError {
         /// The file.
         path: PathBuf,
     },
+    /// The file cannot be made.
+    #[error("{}: cannot be made: {source}", path.display())]
+    Unmade {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
+    /// The name is a folder's.
+    #[error("{}: expected the name of a new file, found a folder's", path.display())]
+    Folder {
+        /// The name.
+        path: PathBuf,
+    },
     /// The system gives no thread for the slow work of the disk.
     #[error("no thread can be started that brings files to the disk: {0}")]
     Thread(std::io::Error),

@@ -210,6 +210,23 @@ fn a_flight_recorder_keeps_what_it_is_asked_to_whatever_ends_it() {
 }
 
 #[test]
+fn a_name_that_no_new_file_can_have_is_refused_before_anything_is_written() {
+    let site = TestSite::new(&["v_mils"]);
+    std::fs::create_dir(site.at("folder")).unwrap();
+    for (name, status, said) in [
+        ("folder/", 2, "expected the name of a new file, found a folder's\n"),
+        ("new.mcap/", 2, "expected the name of a new file, found a folder's\n"),
+        ("folder", 2, "exists already, and is not overwritten: give another name\n"),
+        ("none/new.mcap", 1, "cannot be made: No such file or directory (os error 2)\n"),
+    ] {
+        let path = format!("{}/{name}", site.at("").display()).replace("//", "/");
+        let output = run(&["record", "--root"], &[&site.at("root"), "-o".as_ref(), path.as_ref()]);
+        assert_eq!(output.status.code(), Some(status), "{}", words(&output));
+        assert!(words(&output).ends_with(&format!("{path}: {said}")), "{}", words(&output));
+    }
+}
+
+#[test]
 fn a_closed_pipe_is_no_failure_and_a_full_disk_is_reported_by_the_name_that_was_called() {
     let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
     for name in ["dynocar-recording", "dynocar"] {
