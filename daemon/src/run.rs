@@ -22,7 +22,8 @@ use super::runtime::system::{
     STACK_BYTES, lock_all_memory, pin_to_core, prefault_stack, raise_open_files, set_fifo_priority,
 };
 use crate::config::{
-    DaemonConfig, IdleStrategy, ModelsConfig, SettingRefused, ThreadConfig, build_pipeline,
+    DaemonConfig, IdleStrategy, ModelsConfig, RootError, SettingRefused, ThreadConfig,
+    build_pipeline,
 };
 use crate::ending::{self, EndingError};
 use crate::models::Store;
@@ -41,6 +42,9 @@ use crate::supervision::notify::{Supervisor, Watchdog};
 /// Why the daemon could not start or had to stop.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
+    /// The run-time directory cannot be used.
+    #[error(transparent)]
+    Root(#[from] RootError),
     /// A channel cannot be opened.
     #[error(transparent)]
     Channel(#[from] ChannelError),
@@ -72,7 +76,7 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
     let mut config = config.clone();
     shadow::in_force::settle(&mut config);
     let config = &config;
-    let host = Host::of(config.process.root.as_deref())?;
+    let host = config.process.host()?;
     let stop = ending::flag()?;
     let trains: Vec<TrainId> = config.trains.iter().map(|train| train.id).collect();
     let roles = trains

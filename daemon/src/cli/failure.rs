@@ -123,6 +123,7 @@ impl From<ConfigError> for Failure {
         let message = error.to_string();
         match error {
             ConfigError::Model(error) => error.into(),
+            ConfigError::Root(_) => Failure::Input(message),
             ConfigError::Unreadable { path, .. }
             | ConfigError::Malformed { path, .. }
             | ConfigError::OutOfRange { path, .. } => Failure::at(&path, message),

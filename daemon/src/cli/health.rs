@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use dynocar_shared::TrainId;
-use dynocar_transport::{Host, Peer, Role};
+use dynocar_transport::{Peer, Role};
 
 use super::Failure;
 use crate::config::DaemonConfig;
@@ -33,8 +33,7 @@ pub struct HealthArguments {
 /// The worst verdict of all trains unless it is ok; an unusable configuration or directory.
 pub fn execute(arguments: &HealthArguments) -> Result<(), Failure> {
     let config = arguments.config.as_deref().map(DaemonConfig::load).transpose()?;
-    let root = config.as_ref().and_then(|config| config.process.root.as_deref());
-    let host = Host::of(root).map_err(Failure::work)?;
+    let host = DaemonConfig::host_of(config.as_ref()).map_err(Failure::work)?;
     let trains: Vec<TrainId> = match (arguments.train, &config) {
         (Some(train), _) => vec![TrainId(train)],
         (None, Some(config)) => config.trains.iter().map(|train| train.id).collect(),

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 use std::net::SocketAddr;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use dynocar_dataset::dataset_diagnostic::diagnostics;
@@ -112,7 +112,8 @@ pub fn check(path: &Path, text: &str) -> Result<DaemonConfig, ConfigError> {
     let checker = Checker { path };
     let (mut trains, named): (Vec<_>, Vec<_>) =
         check_trains(&checker, raw.trains)?.into_iter().unzip();
-    let process = raw.daemon;
+    let process = ProcessConfig { file: path.into(), ..raw.daemon };
+    process.check_root()?;
     if process.log_filter().is_none() {
         let allowed =
             "off, error, warn, info, debug or trace, or these by module, as dynocar=debug";
@@ -170,10 +171,8 @@ fn check_state(
     checker: &Checker,
     mut state: StateConfig,
 ) -> Result<Option<StateConfig>, ConfigError> {
-    state.directory = state.directory.map(|named| checker.folder().join(named));
-    if let Some(named) = state.directory.as_ref().filter(|it| !it.is_dir()) {
-        return checker.refuse("state.directory", named.display(), "an existing directory");
-    }
+    let existing = |named: PathBuf| checker.existing_directory("state.directory", &named);
+    state.directory = state.directory.map(existing).transpose()?;
     checker.range("state.interval_s", state.interval_s, 1, 3_600)?;
     checker.range("state.age_max_h", state.age_max_h, 1, 10_000)?;
     Ok(state.keep.then_some(state))
@@ -341,11 +340,7 @@ fn check_pipeline_trains(
 
 /// Checks the store and the fate of models on trial; the directory must be there when the daemon starts.
 fn check_models(checker: &Checker, raw: RawModels) -> Result<ModelsConfig, ConfigError> {
-    let directory = checker.folder().join(&raw.directory);
-    if !directory.is_dir() {
-        let given = raw.directory.display();
-        return checker.refuse("models.directory", given, "an existing directory");
-    }
+    let directory = checker.existing_directory("models.directory", &raw.directory)?;
     let least_gain = raw.least_gain.unwrap_or(USUAL_LEAST_GAIN);
     if !(0.0..=0.9).contains(&least_gain) {
         let allowed = "a share of the error, 0 to 0.9";

@@ -7,15 +7,18 @@
 //!
 //! - here: the parts of a configuration, as checked and as the text has them; refusals; a pipeline from its settings
 //! - `check`: from the text to a [`DaemonConfig`]
+//! - `places`: the directories that it names
 //! - `quantities`: the pipeline that answers each of a controller's questions
 //! - `apart`: a thread of their own for slow pipelines
 
 mod apart;
 mod check;
+mod places;
 mod quantities;
 
 pub use apart::is_slow;
 pub use check::{DaemonConfig, TrainConfig};
+pub use places::RootError;
 pub use quantities::Answers;
 
 use std::collections::BTreeMap;
@@ -66,6 +69,9 @@ pub enum ConfigError {
     /// A train or track file is wrong; the message names it.
     #[error(transparent)]
     Model(#[from] crate::dataset::LoadError),
+    /// The run-time directory cannot be one.
+    #[error(transparent)]
+    Root(#[from] RootError),
 }
 
 /// Names the configuration's file in every refusal.
@@ -135,6 +141,9 @@ pub enum LogFormat {
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ProcessConfig {
+    /// The configuration's file; empty without one.
+    #[serde(skip)]
+    pub file: PathBuf,
     /// Run-time directory; the environment's when absent.
     pub root: Option<PathBuf>,
     /// Level of the log, as `info` or `dynocar=debug`.
@@ -154,6 +163,7 @@ pub struct ProcessConfig {
 impl Default for ProcessConfig {
     fn default() -> Self {
         ProcessConfig {
+            file: PathBuf::new(),
             root: None,
             log: "info".into(),
             log_format: LogFormat::Text,

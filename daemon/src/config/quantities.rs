@@ -1,6 +1,7 @@
 //! The pipeline that answers each of a controller's questions, for each train.
 
 use dynocar_core::pipeline::output::candidates;
+use dynocar_dataset::error::unknown;
 use dynocar_shared::{Quantity, TrainId};
 
 use super::{Checker, ConfigError, PipelineConfig, RawQuantities};
@@ -30,9 +31,9 @@ impl Answers {
         for (named, table) in tables {
             let is_unknown = |name: &&String| Quantity::from_name(name).is_none();
             if let Some(name) = named.keys().find(is_unknown) {
-                let names: Vec<_> = Quantity::ALL.iter().map(|it| it.name()).collect();
-                let allowed = format!("one of {}", names.join(", "));
-                return checker.refuse(table, name, allowed);
+                let names = Quantity::ALL.iter().map(|it| it.name());
+                let message = unknown("quantity", name, &format!(" in [{table}]"), names);
+                return Err(ConfigError::Malformed { path: checker.path.into(), message });
             }
         }
         let mut answers = Answers::default();
@@ -144,6 +145,11 @@ mod tests {
                 "quantities.resistance = resistance_kalman: expected the name of a [[pipelines]] \
                  table that serves train 1 and gives resistance: v_mils, rls, trajectory_kalman",
             ),
+            (
+                "adhesn = \"rls\"",
+                "unknown quantity 'adhesn' in [quantities]; did you mean 'adhesion'? (choices: \
+                 'resistance', 'mass', ",
+            ),
             ("mass = \"rls\"", "quantities.mass = rls: expected the name of a [[pipelines]] table"),
             (
                 "adhesion = \"adhesion_law\"",
@@ -151,7 +157,10 @@ mod tests {
                  adhesion_em; there is none",
             ),
             ("resistance = \"trajectory_kalman\"", "table that serves train 2 and gives"),
-            ("speed = \"rls\"", "quantities = speed: expected one of resistance, mass, adhesion"),
+            (
+                "speed = \"rls\"",
+                "unknown quantity 'speed' in [quantities] (choices: 'resistance', 'mass', 'adhesion'",
+            ),
         ];
         for (for_all, expected) in cases {
             let message = load(for_all, "").unwrap_err().to_string();

@@ -18,7 +18,6 @@ use dynocar::ending::ProgramEnding;
 use dynocar::observing::ObservedSelection;
 use dynocar::output::{OutputError, can_draw, is_utf8};
 use dynocar_shared::TrainId;
-use dynocar_transport::Host;
 use ratatui::DefaultTerminal;
 
 use crate::screen::{Palette, ScreenChoice, ScreenView, draw};
@@ -59,8 +58,7 @@ pub fn main() -> ExitCode {
 fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let config = arguments.config.as_deref().map(DaemonConfig::load).transpose()?;
     let trains = wanted(arguments, config.as_ref())?;
-    let root = config.as_ref().and_then(|config| config.process.root.as_deref());
-    let host = Host::of(root).map_err(Failure::work)?;
+    let host = DaemonConfig::host_of(config.as_ref()).map_err(Failure::work)?;
     let ending = ProgramEnding::begin().map_err(Failure::work)?;
     end_though_stuck(Arc::clone(&ending.flag))
         .map_err(|error| Failure::Work(format!("watching for the end: {error}")))?;

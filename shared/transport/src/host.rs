@@ -86,6 +86,22 @@ impl Host {
     ///
     /// When the path is relative or too long, cannot be made, or belongs to someone else.
     pub fn at(root: &Path) -> Result<Self, ChannelError> {
+        Host::check_name(root)?;
+        require_own(root)?;
+        for directory in [root, &root.join(TRAINS)] {
+            make_private_directory(directory)?;
+        }
+        let identity = DirectoryIdentity::from_path(root)
+            .map_err(unusable(root, "looking at the directory"))?;
+        Ok(Host { root: root.to_path_buf(), identity })
+    }
+
+    /// Checks the name of a root, whether it is there or not.
+    ///
+    /// # Errors
+    ///
+    /// When it is relative, too long or no plain name.
+    pub fn check_name(root: &Path) -> Result<(), ChannelError> {
         let is_plain = |byte: &u8| byte.is_ascii_alphanumeric() || b"/._-+".contains(byte);
         let bytes = root.as_os_str().as_encoded_bytes();
         if bytes.len() > ROOT_BYTES_MAX {
@@ -95,13 +111,7 @@ impl Host {
         if !root.is_absolute() || !bytes.iter().all(is_plain) {
             return Err(ChannelError::RootName { path: root.into() });
         }
-        require_own(root)?;
-        for directory in [root, &root.join(TRAINS)] {
-            make_private_directory(directory)?;
-        }
-        let identity = DirectoryIdentity::from_path(root)
-            .map_err(unusable(root, "looking at the directory"))?;
-        Ok(Host { root: root.to_path_buf(), identity })
+        Ok(())
     }
 
     /// Returns the root directory.

@@ -13,7 +13,6 @@ use dynocar::ending;
 use dynocar::observing::{EventKind, ObservedTrain};
 use dynocar::output::{print, require_files, write_file};
 use dynocar_shared::vocabulary::EffectKind;
-use dynocar_transport::Host;
 use tracing::{info, warn};
 
 use super::threads::Threads;
@@ -85,7 +84,7 @@ fn learn(arguments: &LearnArguments) -> Result<(), Failure> {
         write_report(report, &learner)?;
         return Ok(print(&lines_of(&round))?);
     }
-    let host = Host::of(config.process.root.as_deref()).map_err(Failure::work)?;
+    let host = config.process.host().map_err(Failure::work)?;
     let suspicions = config.trains.iter().map(|train| {
         ObservedTrain::open(&host, train.id).map(Suspicions::new).map_err(Failure::work)
     });
