@@ -26,6 +26,14 @@ pub fn expect(holds: bool, words: impl FnOnce() -> String) -> Result<(), BenchEr
     if holds { Ok(()) } else { Err(Usage(words()).into()) }
 }
 
+/// Returns a parser of whole numbers from `least` on.
+pub fn at_least(least: usize) -> impl Fn(&str) -> Result<usize, String> + Clone {
+    move |text| {
+        let number = text.parse().ok().filter(|number| *number >= least);
+        number.ok_or_else(|| format!("expected a whole number, {least} or more"))
+    }
+}
+
 /// Returns the value for which a name on the command line stands.
 ///
 /// # Errors
@@ -241,6 +249,14 @@ pub fn write_csv(file: &Path, records: &[Record]) -> Result<(), BenchError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_number_that_is_too_small_or_none_is_refused_with_the_least() {
+        assert_eq!(at_least(2)("2"), Ok(2));
+        for text in ["1", "-3", "x", "", "1e3"] {
+            assert_eq!(at_least(2)(text), Err("expected a whole number, 2 or more".into()));
+        }
+    }
 
     #[test]
     fn words_stand_left_and_numbers_right_with_their_intervals() {

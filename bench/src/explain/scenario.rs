@@ -4,7 +4,6 @@
 use std::io;
 use std::path::Path;
 
-use clap::builder::RangedU64ValueParser;
 use clap::{Args, ValueEnum};
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::{Explanation, explain};
@@ -18,7 +17,7 @@ use dynocar_tests::simulator::{
 };
 
 use crate::ending;
-use crate::output::{BenchError, OutputArguments, named};
+use crate::output::{BenchError, OutputArguments, at_least, named};
 
 /// The simulated world in which an effect acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -259,7 +258,7 @@ impl SimulatedCase {
 #[derive(Debug, Args)]
 pub struct FamilyArguments {
     /// Simulated datasets for each kind
-    #[arg(long, default_value_t = 20)]
+    #[arg(long, default_value_t = 20, value_parser = at_least(1))]
     seeds: usize,
     /// The first seed
     #[arg(long, default_value_t = 1)]
@@ -271,7 +270,7 @@ pub struct FamilyArguments {
     #[arg(long, value_enum, default_value_t = ExplainWorld::Plain)]
     world: ExplainWorld,
     /// Runs of a dataset, a quarter of them held out
-    #[arg(long, default_value_t = 8, value_parser = RangedU64ValueParser::<usize>::new().range(2..))]
+    #[arg(long, default_value_t = 8, value_parser = at_least(2))]
     runs: usize,
     /// Datasets at a time
     #[arg(long, default_value_t = 2)]

@@ -16,14 +16,15 @@ mod xie_and_jin;
 use std::path::PathBuf;
 
 use clap::Args;
-use clap::builder::RangedU64ValueParser;
 use dynocar::output::report_line;
 use serde_json::json;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use self::row::{PaperRow, Seeds};
 use crate::ending::until_due;
-use crate::output::{BenchError, OutputArguments, Record, expect_none, named, table, write_csv};
+use crate::output::{
+    BenchError, OutputArguments, Record, at_least, expect_none, named, table, write_csv,
+};
 
 /// Every table of the five papers over seeded runs: the paper's figure, its method, ours, the bound.
 ///
@@ -34,8 +35,7 @@ pub struct PapersArguments {
     #[arg(long)]
     quick: bool,
     /// Seeded runs behind each row
-    #[arg(long, default_value_t = 200, conflicts_with = "quick",
-        value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
+    #[arg(long, default_value_t = 200, conflicts_with = "quick", value_parser = at_least(1))]
     seeds: usize,
     /// The first seed; another one shows whether the figures hold on runs never seen before
     #[arg(long, default_value_t = 0)]
