@@ -267,9 +267,13 @@ const INDENT: usize = 12;
 pub fn text(answer: &ExplainAnswer) -> String {
     let mut text = diagnostics(&answer.diagnostics)
         + &plain(&[&answer.words.heading, &answer.words.left].map(String::as_str).concat());
-    for effect in &answer.effects {
+    let to_dos = effect_words::to_dos(&answer.effects);
+    for (at, effect) in answer.effects.iter().enumerate() {
         text += "\n";
         text += &found(effect);
+        // The last of several says it for all.
+        let own = to_dos.iter().filter(|(_, numbers)| numbers.last() == Some(&(at + 1)));
+        own.for_each(|(to_do, _)| text += &row("to do", to_do));
     }
     text += "\n";
     text += &limits(answer);
@@ -300,8 +304,7 @@ fn others(answer: &ExplainAnswer) -> String {
 /// Returns an effect, a row for each question.
 fn found(effect: &EffectAnswer) -> String {
     let mut rows = row("what", &format!("{} ({})", words::kind_name(effect.kind), effect.kind));
-    let place = effect_words::located(&effect.place);
-    rows += &row("where", place.as_deref().unwrap_or("everywhere"));
+    rows += &row("where", &effect_words::place(effect));
     for size in effect_words::sizes(&effect.parameters, &effect.std) {
         rows += &row("size", &size);
     }
@@ -321,9 +324,6 @@ fn found(effect: &EffectAnswer) -> String {
         rows += &row("or else", &other.in_words());
     }
     rows += &row("sure", &effect_words::sureness(effect.p_value));
-    if let Some(to_do) = effect_words::to_do(effect) {
-        rows += &row("to do", to_do);
-    }
     rows
 }
 

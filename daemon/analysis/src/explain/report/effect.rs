@@ -250,6 +250,28 @@ pub fn located(place: &Location) -> Option<String> {
     (!parts.is_empty()).then(|| parts.join(", "))
 }
 
+/// Returns where an effect acts, of one that changes along the line the stretch that its values cover.
+pub fn place(effect: &EffectAnswer) -> String {
+    let profiles = effect.parameters.values().filter_map(|value| match value {
+        ParameterValue::Profile(nodes) => Some([nodes.first()?[0], nodes.last()?[0]]),
+        _ => None,
+    });
+    let covered = || profiles.map(|stretch| words::stretches(&[stretch])).next();
+    located(&effect.place).or_else(covered).unwrap_or_else(|| "everywhere".into())
+}
+
+/// Returns the recommended actions of effects, each once, with the numbers of its effects from 1.
+pub fn to_dos(effects: &[EffectAnswer]) -> Vec<(&'static str, Vec<usize>)> {
+    let mut all: Vec<(&'static str, Vec<usize>)> = Vec::new();
+    for (at, words) in effects.iter().enumerate().filter_map(|(at, it)| Some((at, to_do(it)?))) {
+        match all.iter_mut().find(|(known, _)| *known == words) {
+            Some((_, numbers)) => numbers.push(at + 1),
+            None => all.push((words, vec![at + 1])),
+        }
+    }
+    all
+}
+
 /// Returns how well the ends of a place are known: half of the widest 95 % interval.
 fn precision(place: &Location) -> Option<String> {
     let known = place.uncertainty_95.as_ref()?;

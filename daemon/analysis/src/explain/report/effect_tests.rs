@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use dynocar_model::words;
+
 use super::effect::*;
 use crate::explain::answer::{
     CovariateRange, EffectAnswer, EffectMeaning, FoundMassSection, Location, ParameterValue,
@@ -83,14 +85,14 @@ fn places_are_reported_in_words_with_the_precision_of_their_ends() {
     assert_eq!(located(&Location::default()), None);
 }
 
-#[test]
-fn an_effect_is_reported_with_its_size_and_interval() {
+/// An effect with a number and its standard deviation.
+fn effect(kind: &'static str, place: Location, [value, std]: [f64; 2]) -> EffectAnswer {
     let number = |value| [("force_n".to_string(), ParameterValue::Number(value))].into();
-    let effect = EffectAnswer {
-        kind: "dragging_brake",
-        place: Location { runs: Some(vec!["runs/02.csv".into()]), ..Location::default() },
-        parameters: number(3058.6),
-        std: number(107.5),
+    EffectAnswer {
+        kind,
+        place,
+        parameters: number(value),
+        std: number(std),
         p_value: 1e-9,
         error_reduction: 0.8,
         meaning: EffectMeaning::default(),
@@ -98,11 +100,37 @@ fn an_effect_is_reported_with_its_size_and_interval() {
         over_time: Vec::new(),
         held_out: None,
         runners_up: Vec::new(),
-    };
+    }
+}
+
+#[test]
+fn an_effect_is_reported_with_its_size_and_interval() {
+    let place = Location { runs: Some(vec!["runs/02.csv".into()]), ..Location::default() };
     assert_eq!(
-        described(&effect),
+        described(&effect("dragging_brake", place, [3058.6, 107.5])),
         "a dragging brake in runs/02.csv – drag force 3059 N (95 % interval 2848 to 3269)"
     );
+}
+
+#[test]
+fn an_effect_along_the_line_is_where_its_values_are_and_others_are_everywhere() {
+    let everywhere = effect("rotating_mass", Location::default(), [0.1, 0.01]);
+    assert_eq!(place(&everywhere), "everywhere");
+    let nodes = ParameterValue::Profile(vec![[120.0, 0.3], [5000.0, -0.2], [9880.0, 0.1]]);
+    let of_line = EffectAnswer { parameters: [("profile".into(), nodes)].into(), ..everywhere };
+    assert_eq!(place(&of_line), words::stretches(&[[120.0, 9880.0]]));
+    let local = Location::of_intervals(vec![[1000.0, 2000.0]]);
+    assert_eq!(place(&EffectAnswer { place: local.clone(), ..of_line }), located(&local).unwrap());
+}
+
+#[test]
+fn what_several_effects_recommend_is_said_once() {
+    let of = |kind| effect(kind, Location::default(), [1.0, 0.1]);
+    let all = ["tunnel_drag", "dragging_brake", "tunnel_drag", "unknown"].map(of);
+    let said = to_dos(&all);
+    let numbers: Vec<&[usize]> = said.iter().map(|it| &it.1[..]).collect();
+    assert_eq!(numbers, [&[1, 3][..], &[2]]);
+    assert_eq!(Some(said[0].0), to_do(&all[0]));
 }
 
 #[test]
