@@ -188,7 +188,7 @@ fn track_toml(material: &Material) -> String {
     let mut text =
         TomlText::new(&format!("{MARK} from {} passes.\n", profile.trips.len()), track::TABLE);
     text.value(&track::NAME, name);
-    text.value(&track::LENGTH, format!("{:.1}", alignments.length_m()));
+    text.value(&track::LENGTH, format!("{:.1}", survey.length_m()));
     text.value(&track::ALIGNMENT, "\"alignment.csv\"");
     let growing = gradient_entries(survey, profile, 1);
     let bounded = |gradient: f64| gradient.clamp(-149.0, 149.0);
