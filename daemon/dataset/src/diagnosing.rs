@@ -9,14 +9,11 @@ use super::diagnostic::{Diagnostic, implausible_columns, read_as};
 use super::force_faults::force_faults;
 use super::forces::{Force, ForceSource};
 use super::keys::run::DIRECTION;
-use super::order::quantile;
 use super::quality::RunQuality;
 use super::quantity::Quantity;
 use super::resolved::{Context, GradientSource, Resolved};
-use super::speed_and_position::PositionSource;
+use super::speed_and_position::{DISTANCE_MIN_M, PositionSource, leap_m, turn};
 
-/// Distance in m below which comparisons of position and speed say nothing.
-const DISTANCE_MIN_M: f64 = 200.0;
 /// Number of rows at either end that show where a run begins and ends.
 const END_ROWS: usize = 5;
 /// Greatest relative difference between position and integrated speed, by wheel wear, balises and gaps.
@@ -285,7 +282,8 @@ fn of_position(
         positions[(positions.len() - 1) / 2]
     };
     let (first, last) = (positions.clone().take(few), positions.clone().rev().take(few));
-    let net_m = median_m(last.collect()) - median_m(first.collect()) - leap_m(positions);
+    let (first_m, last_m) = (median_m(first.collect()), median_m(last.collect()));
+    let net_m = last_m - first_m - leap_m(positions);
     let direction = run.entry.direction;
     let is_reported =
         |faults: &[InputFault]| detected.iter().any(|detected| faults.contains(&detected.fault));
@@ -301,10 +299,18 @@ fn of_position(
     let is_long = position_m.max(speed_m) > DISTANCE_MIN_M;
     let is_mismatch_reported =
         is_reported(&[InputFault::TimeScale, InputFault::SpeedScale, InputFault::PositionScale]);
-    if !is_mismatch_reported
-        && is_long
-        && (position_m - speed_m).abs() > DISTANCE_TOLERANCE * position_m.max(speed_m)
-    {
+    let is_off = |position_m: f64| {
+        (position_m - speed_m).abs() > DISTANCE_TOLERANCE * position_m.max(speed_m)
+    };
+    let turned = quality.position_range_m.and_then(|range_m| turn(range_m, [first_m, last_m]));
+    let turned = turned.filter(|(_, there_and_back_m)| !is_off(*there_and_back_m));
+    if let Some((turn_m, _)) = turned.filter(|_| is_off(position_m)) {
+        let text = format!(
+            "the train goes to {turn_m:.0} m and back, but a run has one direction: make a file of \
+             each way, with its own direction"
+        );
+        diagnostics.push(Diagnostic::new("turns_back", Warning, text, [("turn_m", turn_m.into())]));
+    } else if !is_mismatch_reported && is_long && is_off(position_m) {
         let text = format!(
             "the position covers {position_m:.0} m, the integrated speed {speed_m:.0} m (ratio \
              {:.3}): are the units of time, position and speed right?",
@@ -331,17 +337,6 @@ fn of_line(context: Context, quality: &RunQuality, diagnostics: &mut Vec<Diagnos
             [("from_m", from_m.into()), ("to_m", to_m.into()), ("length_m", length_m.into())];
         diagnostics.push(Diagnostic::new("off_the_line", Warning, text, figures));
     }
-}
-
-/// Returns the leap in m from a position that a receiver held before its first fix; 0 without one.
-fn leap_m(positions: impl Iterator<Item = f64>) -> f64 {
-    let positions: Vec<f64> = positions.collect();
-    let held = positions.iter().take_while(|it| **it == positions[0]).count();
-    let Some(&fixed_m) = positions.get(held).filter(|_| positions[0] == 0.0) else { return 0.0 };
-    let mut steps: Vec<f64> =
-        positions[held..].windows(2).map(|it| (it[1] - it[0]).abs()).collect();
-    let usual_m = quantile(&mut steps, 0.9).unwrap_or(0.0);
-    if fixed_m.abs() > DISTANCE_MIN_M + 10.0 * usual_m { fixed_m } else { 0.0 }
 }
 
 fn of_force(

@@ -278,6 +278,28 @@ fn likely_mistakes_are_diagnosed() {
 }
 
 #[test]
+fn a_run_that_goes_out_and_comes_back_is_to_be_divided() {
+    let row = |i: i32| format!("{i},10,{}\n", 5000 + 10 * (if i < 120 { i } else { 240 - i }));
+    let run_of = |rows: std::ops::Range<i32>| {
+        let csv = format!("t,v,s\n{}", rows.map(row).collect::<String>());
+        Example::new(&[["position", "s", "m"]], &csv).run()
+    };
+    let found = |rows| {
+        let run = run_of(rows);
+        let codes = run.diagnostics.iter().map(|it| (it.code, it.text.clone()));
+        codes.filter(|(code, _)| ["turns_back", "distance_mismatch"].contains(code)).collect()
+    };
+    let text = "the train goes to 6200 m and back, but a run has one direction: make a file of each \
+                way, with its own direction";
+    let expected = vec![("turns_back", text.to_string())];
+    for rows in [0..240, 0..200, 60..240] {
+        let turned: Vec<(&str, String)> = found(rows);
+        assert_eq!(turned, expected);
+    }
+    assert_eq!(found(0..120), []);
+}
+
+#[test]
 fn a_file_that_breaks_off_within_a_line_is_diagnosed() {
     let breaks_off = |csv: &str| {
         let run = Example::new(&[], csv).run();
