@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use dynocar_model::units::Unit;
 
 use super::clock::TimeFormat;
-use super::keys::column::FORMAT;
+use super::keys::column::{FORMAT, UNIT};
 use super::keys::dataset::{DECIMAL, THOUSANDS as GROUPS, UNITS_ROW};
 use super::manifest::ColumnMapping;
 use super::quantity::Quantity;
@@ -122,6 +122,14 @@ pub fn not_a_value(
     let hint = if let Some(format) = of_time.first().filter(|_| is_time) {
         let instead = if mapping.format.is_some() { "" } else { " in place of unit" };
         format!("; for such times set {}{instead}", FORMAT.assign(format!("\"{}\"", format.name())))
+    } else if mapping.format.is_some() && parse_cell(cell, layout.marks()).is_some() {
+        let units: Vec<&str> = Unit::of(mapping.quantity.dimension()).map(|it| it.name()).collect();
+        format!(
+            ", a plain number; for those set {} (or {}) in place of {}",
+            UNIT.assign(format!("\"{}\"", mapping.quantity.unit().name())),
+            units.join(", "),
+            FORMAT.name
+        )
     } else if mapping.format.is_none()
         && layout.decimal == b'.'
         && parse_cell(&with_point, Marks::plain(b'.')).is_some()

@@ -116,6 +116,9 @@ impl FileProblem {
     }
 }
 
+/// Remedy for columns of one name.
+pub(crate) const RENAME: &str = ": give each column a name of its own there";
+
 /// Returns the words for a name that may not stand in its place.
 pub fn unknown<T: Into<String>>(
     what: &str,

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use super::cell::lossy;
-use super::error::{DatasetError, SourcePosition, unknown};
+use super::error::{DatasetError, RENAME, SourcePosition, unknown};
 use super::keys::dataset::SKIP_ROWS;
 use super::manifest::ColumnMapping;
 use super::text_layout::TextLayout;
@@ -223,7 +223,7 @@ pub fn find_columns(
         match (found.next(), found.count()) {
             (Some(index), 0) => Ok(index),
             (Some(_), more) => {
-                Err(format!("column '{name}' occurs {} times in the header", 1 + more))
+                Err(format!("column '{name}' occurs {} times in the header{RENAME}", 1 + more))
             }
             (None, _) => {
                 let other =

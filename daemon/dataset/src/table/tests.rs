@@ -61,7 +61,10 @@ fn a_missing_column_is_named_with_the_header() {
     let message = table("", "t\tv\n0\t1\n").unwrap_err();
     assert!(message.ends_with("set delimiter = \"\\t\" in [dataset]"), "{message}");
     let message = table("", "t,v,v\n0,1,2\n").unwrap_err();
-    assert_eq!(message, "a.csv:1: column 'v' occurs 2 times in the header");
+    assert_eq!(
+        message,
+        "a.csv:1: column 'v' occurs 2 times in the header: give each column a name of its own there"
+    );
 }
 
 #[test]
@@ -185,6 +188,11 @@ fn times_of_loggers_are_read_and_bad_ones_named() {
     assert_eq!(
         times("clock", "t;v\n07:13:20;1\n07:99:20;1\n07:13:22;1\n").unwrap_err(),
         "a.csv:3: column 't': expected a time as 07:13:20.2 (format = \"clock\"), got '07:99:20'"
+    );
+    assert_eq!(
+        times("clock", "t;v\n0,2;1\n0,4;1\n").unwrap_err(),
+        "a.csv:2: column 't': expected a time as 07:13:20.2 (format = \"clock\"), got '0,2', a plain \
+         number; for those set unit = \"s\" (or s, ms, us, ns, min, h, d, 100ns) in place of format"
     );
     assert_eq!(
         times("iso", "t;v\n18.03.2026 07:13:20;1\n").unwrap_err(),
