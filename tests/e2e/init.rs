@@ -52,6 +52,29 @@ fn the_demos_recordings_are_described_as_they_are_by_hand() {
 }
 
 #[test]
+fn marks_that_are_stated_are_taken_and_written() {
+    let site = DaemonSite::new();
+    let rows =
+        |cells: &str| (0..9).map(|it| cells.replace('~', &it.to_string())).collect::<String>();
+    let cases = [
+        ("t#v [km/h]\n", "1,~#2.500,5\n", ["#", ","], Some('.')),
+        ("t [s];v [m/s]\n", "~;1,50~\n", [";", "."], Some(',')),
+        ("t [s]\tv [m/s]\n", "~\t1,5\n", ["\\t", ","], None),
+    ];
+    for (at, (header, cells, [delimiter, decimal], thousands)) in cases.into_iter().enumerate() {
+        let text = header.to_owned() + &rows(cells);
+        site.write("a.csv", &text);
+        let folder = format!("made{at}");
+        let marks = ["--delimiter", delimiter, "--decimal", decimal];
+        done(&site, &[&["init", &folder, "--csv", "a.csv"], &marks[..]].concat());
+        let made = open(&site.path().join(&folder)).unwrap().1.manifest.layout;
+        let mark = if delimiter == "\\t" { b'\t' } else { delimiter.as_bytes()[0] };
+        assert_eq!((made.delimiter, made.decimal), (mark, decimal.as_bytes()[0]), "{text}");
+        assert_eq!(made.thousands, thousands, "{text}");
+    }
+}
+
+#[test]
 fn recordings_of_five_houses_in_any_unit_are_described_as_they_were_written() {
     let (mut right, mut wrong) = (0, Vec::new());
     for seed in 1..=24 {

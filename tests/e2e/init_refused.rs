@@ -104,6 +104,17 @@ fn a_wrong_command_line_is_refused_with_what_helps() {
     assert!(message.contains("'velocity' is no quantity; the quantities: time, "), "{message}");
     let message = with(&["--column", "time=A", "--column", "speed=B", "--mass-t", "-5"]);
     assert!(message.contains("train.mass_t = -5: expected a mass in t above 0"), "{message}");
+    for (mark, expected) in [
+        (["--delimiter", ";;"], "expected one ASCII character, as \",\" \";\" or \"\\t\""),
+        (["--decimal", ";"], "expected \".\" or \",\""),
+    ] {
+        let message = with(&mark);
+        assert!(message.contains(expected), "{message}");
+    }
+    let message = with(&["--delimiter", ".", "--decimal", "."]);
+    assert!(message.contains("--decimal: expected another mark than the delimiter"), "{message}");
+    let message = with(&["--delimiter", "|"]);
+    assert!(message.contains("separated by '|', found only 'A"), "{message}");
     let message = with(&["--csv", &csv, "--column", "time=A", "--column", "speed=B"]);
     assert!(message.contains("expected every run once, found the file twice"), "{message}");
     let message = refusal(&site, &["init", &new, "--column", "time=A"]);

@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use dynocar::config::DaemonConfig;
 use dynocar::state::{entry::StateContent, file};
-use dynocar_analysis::dataset::guess::{RecordingText, guess};
+use dynocar_analysis::dataset::guess::{GivenMarks, RecordingText, guess};
 use dynocar_analysis::dataset::text_layout::{decoded, guessed};
 use dynocar_analysis::dataset::{Dataset, Quantity, parse_track, parse_train};
 use dynocar_analysis::import::{ImportReading, ImportSource, import};
@@ -187,7 +187,7 @@ fn feed_logger(bytes: &[u8]) -> bool {
     let Ok(text) = decoded(bytes.to_vec(), guessed(bytes)) else { return false };
     let is_read = feed_dataset(LOGGER, &text);
     let recording = [RecordingText { label: "run.csv", text: &text }];
-    let is_guessed = guess(&recording, &[]).is_ok_and(|guess| {
+    let is_guessed = guess(&recording, &[], GivenMarks::default()).is_ok_and(|guess| {
         assert!(guess.column(Quantity::Speed).is_some(), "{guess:?}");
         true
     });

@@ -63,17 +63,12 @@ impl TextLayout {
         let encoding = ENCODING.named(section, "encoding", by_name, USUAL)?;
         layout.encoding = encoding.unwrap_or(UTF_8);
         if let Some(mark) = DELIMITER.quoted(section)? {
-            layout.delimiter = match mark.as_bytes() {
-                &[mark] if mark.is_ascii() && !b"\"\r\n".contains(&mark) => mark,
-                _ => return Err(DELIMITER.refused(section, format_args!("{mark:?}"))),
-            };
+            let refused = || DELIMITER.refused(section, format_args!("{mark:?}"));
+            layout.delimiter = delimiter_of(mark).ok_or_else(refused)?;
         }
         if let Some(mark) = DECIMAL.quoted(section)? {
-            layout.decimal = match mark {
-                "." => b'.',
-                "," => b',',
-                _ => return Err(DECIMAL.refused(section, format_args!("{mark:?}"))),
-            };
+            let refused = || DECIMAL.refused(section, format_args!("{mark:?}"));
+            layout.decimal = decimal_of(mark).ok_or_else(refused)?;
         }
         if let Some(text) = MARK.quoted(section)? {
             let mark =
@@ -84,12 +79,10 @@ impl TextLayout {
             layout.thousands = Some(mark.filter(is_other).ok_or_else(refused)?);
         }
         layout.skip_rows = SKIP_ROWS.number(section)?.unwrap_or(0.0) as usize;
-        // A comma between the digits of a quoted cell separates no cells.
-        if layout.delimiter == layout.decimal && layout.decimal != b',' {
-            let allowed = "another mark than the delimiter";
-            return Err(section.key_out_of_range(DECIMAL.name, "\".\"", allowed));
+        match is_ambiguous(layout.delimiter, layout.decimal) {
+            true => Err(section.key_out_of_range(DECIMAL.name, "\".\"", OTHER_DECIMAL)),
+            false => Ok(layout),
         }
-        Ok(layout)
     }
 
     /// Returns the marks of its numbers.
@@ -101,6 +94,32 @@ impl TextLayout {
     pub fn lines_above(&self) -> usize {
         self.skip_rows + 1 + usize::from(self.units_row)
     }
+}
+
+/// Expected decimal mark where the delimiter is the same.
+pub const OTHER_DECIMAL: &str = "another mark than the delimiter";
+
+/// Returns the separator of cells that a text states.
+pub fn delimiter_of(text: &str) -> Option<u8> {
+    match text.as_bytes() {
+        &[mark] if mark.is_ascii() && !b"\"\r\n".contains(&mark) => Some(mark),
+        _ => None,
+    }
+}
+
+/// Returns the decimal mark that a text states.
+pub fn decimal_of(text: &str) -> Option<u8> {
+    match text {
+        "." => Some(b'.'),
+        "," => Some(b','),
+        _ => None,
+    }
+}
+
+/// Returns true for marks of which one would be taken for the other. A comma between the digits of a quoted cell
+/// separates no cells.
+pub fn is_ambiguous(delimiter: u8, decimal: u8) -> bool {
+    delimiter == decimal && decimal != b','
 }
 
 /// Value of the key where all rows are of one train, even if a column names several.

@@ -1,12 +1,12 @@
 //! The columns of all files together, with facts on their values, and the marks in their numbers.
 
 use super::facts::Facts;
-use super::guessed::RecordingText;
+use super::guessed::{GivenMarks, RecordingText};
 use super::layout::{GuessedLayout, layout};
 use super::name::Name;
 use crate::TextLayout;
 use crate::cell::{is_word, parse_cell, truth, ungrouped};
-use crate::error::{DatasetError, NO_HEADER, SourcePosition};
+use crate::error::{DatasetError, NO_HEADER, RENAME, SourcePosition};
 use crate::lines::{CellRow, RowReader, below};
 use crate::text_layout::{Marks, THOUSANDS};
 
@@ -40,9 +40,9 @@ impl InspectedColumns {
     /// # Errors
     ///
     /// Where one of them has no header or no rows, or another layout than the first.
-    pub fn read(files: &[RecordingText]) -> Result<Self, DatasetError> {
-        let layouts: Vec<GuessedLayout> =
-            files.iter().map(|file| layout(file.label, file.text)).collect::<Result<_, _>>()?;
+    pub fn read(files: &[RecordingText], given: GivenMarks) -> Result<Self, DatasetError> {
+        let of_file = |file: &RecordingText| layout(file.label, file.text, given.delimiter);
+        let layouts: Vec<GuessedLayout> = files.iter().map(of_file).collect::<Result<_, _>>()?;
         let Some(first) = layouts.first() else {
             return Err(SourcePosition::whole("no file").problem(NO_HEADER));
         };
@@ -52,7 +52,7 @@ impl InspectedColumns {
             let text = below(file.label, file.text, it.text.skip_rows)?;
             evidence.push_text(text, it.text.delimiter, it.text.lines_above() - it.text.skip_rows);
         }
-        let marks = evidence.marks();
+        let marks = evidence.marks(given.decimal());
         (first.text.decimal, first.text.thousands) = (marks.decimal, marks.thousands);
         for (file, other) in files.iter().zip(&layouts) {
             require_alike(file, other, (files[0].label, &first.text))?;
@@ -97,7 +97,7 @@ fn unusable(name: &Name, files: &[RecordingText], layouts: &[GuessedLayout]) -> 
         match layout.header.iter().filter(|other| *other == name).count() {
             0 => Some(format!("{} has no such column", file.label)),
             1 => None,
-            count => Some(format!("its name occurs {count} times in {}", file.label)),
+            count => Some(format!("its name occurs {count} times in {}{RENAME}", file.label)),
         }
     })
 }
@@ -224,18 +224,18 @@ impl MarkEvidence {
         }
     }
 
-    /// Returns the marks; without any evidence a point and nothing.
-    pub fn marks(&self) -> Marks {
+    /// Returns the marks, the decimal one as given if it is; without any evidence a point and nothing.
+    pub fn marks(&self, given: Option<u8>) -> Marks {
         let (commas, points) = match (self.commas, self.points) {
             (0, 0) => (self.either_comma, self.either_point),
             sure => sure,
         };
-        let decimal = if commas > points { b',' } else { b'.' };
+        let decimal = given.unwrap_or(if commas > points { b',' } else { b'.' });
         let other = if decimal == b',' { '.' } else { ',' };
         let mut counts = self.thousands;
         let index = THOUSANDS.iter().position(|mark| *mark == other).unwrap_or(0);
         // The other mark stands between groups, where the decimal mark is sure.
-        if self.commas + self.points > 0 {
+        if given.is_some() || self.commas + self.points > 0 {
             counts[index] += if other == '.' { self.either_point } else { self.either_comma };
         }
         let most =
@@ -252,7 +252,7 @@ mod tests {
     fn marks(cells: &[&str]) -> (char, Option<char>) {
         let mut evidence = MarkEvidence::default();
         cells.iter().for_each(|cell| evidence.push(cell.as_bytes()));
-        let Marks { decimal, thousands } = evidence.marks();
+        let Marks { decimal, thousands } = evidence.marks(None);
         (decimal.into(), thousands)
     }
 

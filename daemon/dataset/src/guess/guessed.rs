@@ -32,6 +32,22 @@ pub struct GivenColumn {
     pub format: Option<TimeFormat>,
 }
 
+/// The marks of files as the user states them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GivenMarks {
+    /// Separator of the cells of a row; `None` where header and rows must reveal it.
+    pub delimiter: Option<u8>,
+    /// Separator of a number's fraction; `None` where the numbers must reveal it.
+    pub decimal: Option<u8>,
+}
+
+impl GivenMarks {
+    /// Returns the decimal mark, where one is stated or the delimiter leaves only one.
+    pub(super) fn decimal(&self) -> Option<u8> {
+        self.decimal.or(self.delimiter.filter(|it| *it == b'.').map(|_| b','))
+    }
+}
+
 /// The description of recordings, as far as it can be guessed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Guess {

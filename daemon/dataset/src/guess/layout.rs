@@ -38,33 +38,34 @@ struct Block {
     units: Option<usize>,
 }
 
-/// Recognises the layout of a file.
+/// Recognises the layout of a file, with the delimiter that is given, if one is.
 ///
 /// # Errors
 ///
 /// Where no line above the values holds names of columns, or no values follow.
-pub fn layout(label: &str, text: &str) -> Result<GuessedLayout, DatasetError> {
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let readings = DELIMITERS.map(|delimiter| {
-        let rows = first_rows(text, delimiter);
-        (delimiter, block(&rows), rows)
-    });
+pub fn layout(
+    label: &str,
+    text: &str,
+    delimiter: Option<u8>,
+) -> Result<GuessedLayout, DatasetError> {
+    let readings = readings(text, delimiter);
     let wrong = |line: usize, words: String| Err(SourcePosition::line(label, line).problem(words));
-    let [(.., rows), ..] = &readings;
+    let rows = &readings[0].2;
     if rows.iter().all(|row| row.filled().next().is_none()) {
         return Err(SourcePosition::whole(label).problem(NO_HEADER));
     }
     let best =
         readings.iter().max_by(|one, other| fit(one.1, &one.2).total_cmp(&fit(other.1, &other.2)));
-    let Some((delimiter, block, rows)) =
+    let Some((mark, block, rows)) =
         best.filter(|(.., rows)| rows.iter().any(|row| row.cells.len() > 1))
     else {
         let found = Name::parse(&rows[0].cells.join(",")).shown();
         return wrong(
             1,
             format!(
-                "expected names of columns separated by a comma, semicolon, tab or |, found only \
-                 '{found}'"
+                "expected names of columns separated by {}, found only '{found}': --delimiter says \
+                 another mark",
+                delimiter.map_or("a comma, semicolon, tab or |".into(), shown_mark)
             ),
         );
     };
@@ -96,12 +97,30 @@ pub fn layout(label: &str, text: &str) -> Result<GuessedLayout, DatasetError> {
         let unit = units.and_then(|row| row.cells.get(index)).map(|cell| without_brackets(cell));
         Name::parse(cell).with_unit(unit.filter(|unit| !unit.is_empty() && is_unit(unit)))
     };
-    let (delimiter, skip_rows) = (*delimiter, names.line - 1);
+    let (delimiter, skip_rows) = (*mark, names.line - 1);
     let units_row = units.is_some();
     Ok(GuessedLayout {
         text: TextLayout { delimiter, skip_rows, units_row, ..TextLayout::PLAIN },
         header: names.cells.iter().enumerate().map(name).collect(),
     })
+}
+
+/// Returns the first rows as each possible delimiter divides them, with their names and units.
+fn readings(text: &str, given: Option<u8>) -> Vec<(u8, Option<Block>, Vec<Row>)> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let reading = |delimiter: u8| {
+        let rows = first_rows(text, delimiter);
+        (delimiter, block(&rows), rows)
+    };
+    given.map_or(DELIMITERS.to_vec(), |it| vec![it]).into_iter().map(reading).collect()
+}
+
+/// Returns a delimiter for people.
+pub fn shown_mark(delimiter: u8) -> String {
+    match delimiter {
+        b'\t' => "a tab".into(),
+        mark => format!("'{}'", char::from(mark)),
+    }
 }
 
 fn first_rows(text: &str, delimiter: u8) -> Vec<Row> {
@@ -206,13 +225,20 @@ fn is_below_names(rows: &[Row], at: usize) -> bool {
 }
 
 /// Returns how well the rows fall into columns: the more columns the better, where rows agree on them with
-/// each other and with the header.
+/// each other and with the header, and their cells hold values: a comma in names or numbers separates none.
 fn fit(block: Option<Block>, rows: &[Row]) -> f64 {
+    let first = block.map_or(0, |block| block.units.unwrap_or(block.header) + 1);
+    let values = &rows[first.min(rows.len())..];
     let rows = &rows[block.map_or(0, |block| block.header)..];
     let Some(width) = usual_width(rows).filter(|width| *width > 1) else { return 0.0 };
     let agree = rows.iter().filter(|row| row.cells.len() == width).count();
     let of_header = if rows[0].cells.len() == width { 1.0 } else { 0.05 };
-    of_header * width as f64 * (agree as f64 / rows.len() as f64).powi(2)
+    let filled: usize = values.iter().map(|row| row.filled().count()).sum();
+    let of_values: usize = values.iter().map(Row::values).sum();
+    // Without any value one delimiter may still be better than the others.
+    let shares = [(agree, rows.len()), (1 + of_values, 1 + filled)];
+    let shares = shares.map(|(part, whole)| (part as f64 / whole as f64).powi(2));
+    of_header * width as f64 * shares[0] * shares[1]
 }
 
 /// Returns the number of cells that most rows have.
@@ -228,13 +254,14 @@ mod tests {
 
     fn recognised(text: &str) -> (char, char, usize) {
         let file = crate::guess::RecordingText { label: "a.csv", text };
-        let read = crate::guess::columns::InspectedColumns::read(&[file]).unwrap().layout;
+        let marks = crate::guess::GivenMarks::default();
+        let read = crate::guess::columns::InspectedColumns::read(&[file], marks).unwrap().layout;
         let TextLayout { delimiter, decimal, .. } = read.text;
         (char::from(delimiter), char::from(decimal), read.header.len())
     }
 
     fn refusal(text: &str) -> String {
-        layout("a.csv", text).unwrap_err().to_string()
+        layout("a.csv", text, None).unwrap_err().to_string()
     }
 
     #[test]
@@ -247,6 +274,28 @@ mod tests {
         assert_eq!(recognised("t,v\n\"0,5\",\"1,5\"\n"), (',', ',', 2));
         assert_eq!(recognised("\u{feff}t;v, measured\n0;1.0\n"), (';', '.', 2));
         assert_eq!(recognised("t,v,note\n0,1.5,\"a;b\"\n1,1.5,\"c;d\"\n"), (',', '.', 3));
+    }
+
+    #[test]
+    fn a_name_may_hold_any_mark_but_the_delimiter() {
+        let rows = |delimiter: &str, decimal: &str| {
+            let row = |it: u32| [it, 3 * it, 40 + it].map(|it| format!("{it}{decimal}5"));
+            (0..9).map(|it| row(it).join(delimiter) + "\n").collect::<String>()
+        };
+        for (delimiter, decimals) in [(",", "."), (";", ".,"), ("\t", ".,"), ("|", ".,")] {
+            for inner in [",", ";", "|"].into_iter().filter(|it| *it != delimiter) {
+                let names = ["Zeit", "Weg", "Geschwindigkeit"].map(|it| format!("{it}{inner} x"));
+                for decimal in decimals.chars() {
+                    let text = format!(
+                        "{}\n{}",
+                        names.join(delimiter),
+                        rows(delimiter, &decimal.to_string())
+                    );
+                    let delimiter = delimiter.chars().next().unwrap();
+                    assert_eq!(recognised(&text), (delimiter, decimal, 3), "{text}");
+                }
+            }
+        }
     }
 
     #[test]
@@ -267,7 +316,7 @@ mod tests {
     #[test]
     fn lines_above_the_names_and_units_below_them_are_distinguished() {
         let read = |text: &str| {
-            let layout = layout("a.csv", text).unwrap();
+            let layout = layout("a.csv", text, None).unwrap();
             let names: Vec<String> = layout.header.iter().map(|name| name.text.clone()).collect();
             let units: Vec<Option<String>> =
                 layout.header.iter().map(|it| it.unit.clone()).collect();

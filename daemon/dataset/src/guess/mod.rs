@@ -24,8 +24,10 @@ mod plausible;
 #[cfg(test)]
 mod tests;
 
-pub use guessed::{GivenColumn, Guess, GuessedColumn, GuessedRun, RecordingText, Unmapped};
-pub use layout::{GuessedLayout, layout};
+pub use guessed::{
+    GivenColumn, GivenMarks, Guess, GuessedColumn, GuessedRun, RecordingText, Unmapped,
+};
+pub use layout::{GuessedLayout, layout, shown_mark};
 pub use name::Name;
 
 use dynocar_model::units::Unit;
@@ -36,14 +38,18 @@ use assignment::Assignment;
 /// A force with more than this share of values below zero is signed.
 const SIGNED_SHARE: f64 = 0.02;
 
-/// Guesses the description of recordings with the same layout; declared columns stay as given.
+/// Guesses the description of recordings with the same layout; declared columns and marks stay as given.
 ///
 /// # Errors
 ///
 /// If a file cannot be part of a dataset, or holds no time or no speed that can be recognised; with file, line and
 /// the expected contents.
-pub fn guess(files: &[RecordingText], given: &[GivenColumn]) -> Result<Guess, DatasetError> {
-    let read = columns::InspectedColumns::read(files)?;
+pub fn guess(
+    files: &[RecordingText],
+    given: &[GivenColumn],
+    marks: GivenMarks,
+) -> Result<Guess, DatasetError> {
+    let read = columns::InspectedColumns::read(files, marks)?;
     let label = files.first().map_or("", |file| file.label);
     let mut assignment = Assignment::new(&read, given, label)?;
     settle(&mut assignment);

@@ -35,11 +35,13 @@ fn file(header: &str, cells: impl Fn(&[f64; 5]) -> Vec<String>) -> String {
 }
 
 fn guessed(text: &str) -> Guess {
-    guess(&[RecordingText { label: "a.csv", text }], &[]).unwrap()
+    guess(&[RecordingText { label: "a.csv", text }], &[], GivenMarks::default()).unwrap()
 }
 
 fn refusal(text: &str) -> String {
-    guess(&[RecordingText { label: "a.csv", text }], &[]).unwrap_err().to_string()
+    guess(&[RecordingText { label: "a.csv", text }], &[], GivenMarks::default())
+        .unwrap_err()
+        .to_string()
 }
 
 /// Returns the mapping of each quantity: column, unit and factor.
@@ -246,7 +248,7 @@ fn a_falling_position_is_a_run_backwards() {
         RecordingText { label: "a.csv", text: &up },
         RecordingText { label: "b.csv", text: &down },
     ];
-    let guess = guess(&files, &[]).unwrap();
+    let guess = guess(&files, &[], GivenMarks::default()).unwrap();
     let directions: Vec<i8> = guess.runs.iter().map(|run| run.direction).collect();
     assert_eq!(directions, [1, -1]);
 }
@@ -261,7 +263,7 @@ fn a_column_that_another_file_lacks_or_fills_with_words_is_left_out() {
             RecordingText { label: "a.csv", text: &one },
             RecordingText { label: "b.csv", text: other },
         ];
-        guess(&files, &[]).unwrap()
+        guess(&files, &[], GivenMarks::default()).unwrap()
     };
     assert_eq!(of(&two).unmapped[0].reason, "b.csv has no such column");
     let reason = &of(&three).unmapped[0].reason;
@@ -277,7 +279,7 @@ fn files_of_another_layout_are_refused() {
         RecordingText { label: "a.csv", text: &one },
         RecordingText { label: "b.csv", text: &two },
     ];
-    let message = guess(&files, &[]).unwrap_err().to_string();
+    let message = guess(&files, &[], GivenMarks::default()).unwrap_err().to_string();
     assert!(message.starts_with("b.csv: the delimiter is \";\", but \",\" in a.csv"), "{message}");
 }
 
@@ -312,9 +314,11 @@ fn what_is_reported_is_taken_for_granted() {
     };
     let files = [RecordingText { label: "a.csv", text: &text }];
     let all = [given(Time, "A", None), given(Speed, "B", kmh)];
-    let guessed = guess(&files, &all).unwrap();
+    let guessed = guess(&files, &all, GivenMarks::default()).unwrap();
     assert_eq!(mapped(&guessed), [(Time, "A", "s", 1.0), (Speed, "B", "km/h", 1.0)]);
-    let refused = |given: GivenColumn| guess(&files, &[given]).unwrap_err().to_string();
+    let refused = |given: GivenColumn| {
+        guess(&files, &[given], GivenMarks::default()).unwrap_err().to_string()
+    };
     let message = refused(given(Time, "C", None));
     assert_eq!(message, "a.csv:1: no column 'C' for time; the columns: 'A', 'B', 'v'");
     let message = refused(given(Time, "v", None));
@@ -327,7 +331,8 @@ fn a_loggers_preamble_units_and_clock_times_are_described() {
                 ;hh:mm:ss;km/h;kN;\n\
                 18.03.2026;23:59:59,0;10,5;60;\n18.03.2026;23:59:59,5;11,5;60;x\n\
                 19.03.2026;00:00:00,0;12,5;60;\n19.03.2026;00:00:00,5;13,5;60;\n";
-    let guess = guess(&[RecordingText { label: "a.csv", text }], &[]).unwrap();
+    let guess =
+        guess(&[RecordingText { label: "a.csv", text }], &[], GivenMarks::default()).unwrap();
     assert_eq!((guess.layout.delimiter, guess.layout.decimal), (b';', b','));
     assert_eq!((guess.layout.skip_rows, guess.layout.units_row), (2, true));
     let time = guess.column(Quantity::Time).unwrap();
@@ -346,7 +351,9 @@ fn dates_are_recognised_by_their_cells_and_doubtful_where_day_and_month_could_be
         let row = |(k, time): (usize, &str)| format!("{time};{}\n", 10 + k);
         let rows: String = times.into_iter().enumerate().map(row).collect();
         let text = format!("Zeitpunkt;v [km/h]\n{rows}");
-        let guess = guess(&[RecordingText { label: "a.csv", text: &text }], &[]).unwrap();
+        let guess =
+            guess(&[RecordingText { label: "a.csv", text: &text }], &[], GivenMarks::default())
+                .unwrap();
         let time = guess.column(Quantity::Time).unwrap().clone();
         (time.format.unwrap().name().to_owned(), time.doubts.join(" "), guess.runs[0].day)
     };

@@ -75,7 +75,9 @@ fn describe(
 ) -> Result<Described, Failure> {
     let (texts, encoding) = recordings::texts(&arguments.csv, arguments.encoding)?;
     let files = recordings::from_folder(arguments.folder(), &arguments.csv)?;
-    let chosen = recordings::of_train(&texts, arguments.train_cell.as_deref())?;
+    let marks = arguments.marks()?;
+    let train_cell = arguments.train_cell.as_deref();
+    let chosen = recordings::of_train(&texts, marks.delimiter, train_cell)?;
     let recordings: Vec<RecordingText> =
         texts.iter().map(|(label, text)| RecordingText { label, text }).collect();
     let own = recordings.iter().enumerate();
@@ -86,7 +88,7 @@ fn describe(
         })
         .collect();
     let rows = chosen.as_ref().map(|it| &it.rows);
-    let mut guess = guess(&own, &arguments.column)
+    let mut guess = guess(&own, &arguments.column, marks)
         .map_err(|error| recordings::with_encoding(error, encoding, arguments.encoding))?;
     guess.layout.encoding = encoding;
     let track = match has_track {
@@ -313,14 +315,15 @@ fn daemon_text(has_track: bool) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynocar_analysis::dataset::guess::{RecordingText, guess};
+    use dynocar_analysis::dataset::guess::{GivenMarks, RecordingText, guess};
     use dynocar_analysis::dataset::manifest::{Manifest, Role};
 
     #[test]
     fn names_with_any_marks_lead_back_to_their_column() {
         let text = "\"t \"\"s\"\" [s]\";\"v\t\\x [km/h]\";\"a\nb\"\n0;1;2\n1;50;3\n2;90;4\n";
         let files = [RecordingText { label: "a.csv", text }];
-        let guess = guess(&files, &[]).unwrap_or_else(|error| panic!("{error}"));
+        let guess =
+            guess(&files, &[], GivenMarks::default()).unwrap_or_else(|error| panic!("{error}"));
         let files = ["da\"y\\1.csv".to_string()];
         let text = dataset_text(&guess, ("x\n[y]", None), &files, true);
         let manifest = Manifest::parse("dataset.toml", &text).unwrap_or_else(|it| panic!("{it}"));
@@ -336,7 +339,7 @@ mod tests {
         let text = "t,v\n0,1\n1,2\n";
         let recording = RecordingText { label: "a.csv", text };
         for count in 1..4 {
-            let guess = guess(&vec![recording; count], &[]).unwrap();
+            let guess = guess(&vec![recording; count], &[], GivenMarks::default()).unwrap();
             let files: Vec<String> = (0..count).map(|index| format!("{index}.csv")).collect();
             let text = dataset_text(&guess, ("x", None), &files, false);
             let manifest = Manifest::parse("dataset.toml", &text).unwrap();

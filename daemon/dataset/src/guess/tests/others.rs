@@ -10,7 +10,8 @@ fn guess_of(names: &[&str], row: impl Fn(f64) -> Vec<f64>) -> Result<Guess, Stri
         cells.collect::<Vec<_>>().join(";") + "\n"
     });
     let text = format!("time [s];speed [m/s];{}\n{}", names.join(";"), rows.collect::<String>());
-    guess(&[RecordingText { label: "a.csv", text: &text }], &[]).map_err(|error| error.to_string())
+    guess(&[RecordingText { label: "a.csv", text: &text }], &[], GivenMarks::default())
+        .map_err(|error| error.to_string())
 }
 
 #[test]
@@ -156,7 +157,8 @@ fn times_of(cells: impl Fn(f64) -> String) -> (Guess, Vec<i64>) {
         format!("{};{:.3};{}\n", cells(time), 0.05 * time, 300.0 - time)
     });
     let text = format!("Timestamp;speed [m/s];traction force [kN]\n{}", rows.collect::<String>());
-    let guess = guess(&[RecordingText { label: "a.csv", text: &text }], &[]).unwrap();
+    let guess = guess(&[RecordingText { label: "a.csv", text: &text }], &[], GivenMarks::default())
+        .unwrap();
     let time = guess.column(Time).unwrap();
     let how = match &time.format {
         Some(format) => format!("format='{}'", format.name()),

@@ -9,14 +9,18 @@ use dynocar::cli::Failure;
 use dynocar::cli::text::{TextTable, entry};
 use dynocar::models::text::TRAIN_FILE;
 use dynocar::output::require_new;
-use dynocar_analysis::dataset::guess::{GivenColumn, Guess};
-use dynocar_analysis::dataset::text_layout::by_name;
+use dynocar_analysis::dataset::guess::{GivenColumn, GivenMarks, Guess, shown_mark};
+use dynocar_analysis::dataset::keys::dataset::{DECIMAL, DELIMITER};
+use dynocar_analysis::dataset::text_layout::{
+    OTHER_DECIMAL, by_name, decimal_of, delimiter_of, is_ambiguous,
+};
 use dynocar_analysis::dataset::{DatasetDiagnostic, MANIFEST_FILE, Quantity, TimeFormat};
 use dynocar_model::train::numbers::MASS;
 use dynocar_model::units::Unit;
 use encoding_rs::{Encoding, UTF_8};
 
 use crate::cli::train_text::{ASKED, Asked, TrainArguments, TrainText};
+use crate::formats::run_reader;
 use crate::report::provenance::for_shell;
 use crate::run_facts::diagnostics;
 
@@ -38,6 +42,12 @@ pub struct InitArguments {
     /// Which letters the files' bytes are, as windows-1251 or gbk [default: UTF-8, else guessed]
     #[arg(long, value_name = "NAME", requires = "csv", value_parser = encoding)]
     pub encoding: Option<&'static Encoding>,
+    /// The mark between the cells of a row, as ';' or '\t' [default: guessed]
+    #[arg(long, value_name = "MARK", requires = "csv", value_parser = delimiter)]
+    pub delimiter: Option<u8>,
+    /// The mark before a number's fraction: '.' or ',' [default: guessed]
+    #[arg(long, value_name = "MARK", requires = "csv", value_parser = decimal)]
+    pub decimal: Option<u8>,
     /// Take the rows of one train of files that hold several, by its cell in the column that names them
     #[arg(long = "train", value_name = "CELL", requires = "csv")]
     pub train_cell: Option<String>,
@@ -53,6 +63,25 @@ impl InitArguments {
     pub fn folder(&self) -> &Path {
         self.folder.as_deref().unwrap_or(Path::new(FOLDER_DEFAULT))
     }
+
+    /// Returns the marks of the recordings that are stated.
+    ///
+    /// # Errors
+    ///
+    /// Two marks of which one would be taken for the other, and any for files that are no text.
+    pub fn marks(&self) -> Result<GivenMarks, Failure> {
+        let marks = GivenMarks { delimiter: self.delimiter, decimal: self.decimal };
+        if marks != GivenMarks::default() && self.csv.iter().any(|it| run_reader(it).is_some()) {
+            let words = "--delimiter, --decimal: expected files of text with them";
+            return Err(Failure::Input(words.into()));
+        }
+        match (marks.delimiter, marks.decimal) {
+            (Some(delimiter), Some(decimal)) if is_ambiguous(delimiter, decimal) => {
+                Err(Failure::Input(format!("--decimal: expected {OTHER_DECIMAL}")))
+            }
+            _ => Ok(marks),
+        }
+    }
 }
 
 /// Returns whether nobody can be asked.
@@ -64,6 +93,17 @@ fn nobody_is_there() -> bool {
 fn encoding(name: &str) -> Result<&'static Encoding, String> {
     let expected = "expected a name of the WHATWG's, as windows-1251, gbk, shift_jis or ibm866";
     by_name(name).ok_or_else(|| expected.into())
+}
+
+/// Returns a delimiter; shells leave `\t` as it is.
+fn delimiter(text: &str) -> Result<u8, String> {
+    let mark = if text == "\\t" { "\t" } else { text };
+    delimiter_of(mark).ok_or_else(|| format!("expected {}", DELIMITER.rule.allowed))
+}
+
+/// Returns a decimal mark.
+fn decimal(text: &str) -> Result<u8, String> {
+    decimal_of(text).ok_or_else(|| format!("expected {}", DECIMAL.rule.allowed))
 }
 
 /// Parses the user's description of a column: `QUANTITY=COLUMN` or `QUANTITY=COLUMN:UNIT`.
@@ -189,10 +229,7 @@ fn understood(described: &Described) -> String {
         let falls = if run.direction < 0 { ", the position falls" } else { "" };
         text += &format!("{file}: {} rows{falls}\n", run.rows);
     }
-    let delimiter = match layout.delimiter {
-        b'\t' => "a tab".into(),
-        mark => format!("'{}'", char::from(mark)),
-    };
+    let delimiter = shown_mark(layout.delimiter);
     text += &format!("cells end at {delimiter}, decimals at '{}'\n", char::from(layout.decimal));
     if layout.encoding != UTF_8 {
         let name = layout.encoding.name().to_lowercase();

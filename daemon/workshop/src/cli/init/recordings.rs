@@ -134,13 +134,17 @@ pub struct OfTrain {
     pub texts: Vec<String>,
 }
 
-/// Returns the rows of the train that is named, or of all where the files hold one.
+/// Returns the rows of the train that is named, with the delimiter of the files where it is given, or of all where the files hold one.
 ///
 /// # Errors
 ///
 /// Files of several trains of which none is named, and a name that is none of theirs, are an input failure.
-pub fn of_train(files: &[NamedText], named: Option<&str>) -> Result<Option<OfTrain>, Failure> {
-    let layouts = files.iter().map(|(label, text)| layout(label, text));
+pub fn of_train(
+    files: &[NamedText],
+    delimiter: Option<u8>,
+    named: Option<&str>,
+) -> Result<Option<OfTrain>, Failure> {
+    let layouts = files.iter().map(|(label, text)| layout(label, text, delimiter));
     // A file without a layout is refused later.
     let Ok(layouts) = layouts.collect::<Result<Vec<_>, _>>() else { return Ok(None) };
     let trains =
