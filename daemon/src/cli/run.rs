@@ -8,7 +8,7 @@ use tracing::warn;
 use tracing_subscriber::prelude::*;
 
 use super::Failure;
-use crate::config::{DaemonConfig, LogFormat};
+use crate::config::{DaemonConfig, LogFormat, RootError};
 use crate::demo::{DemoError, play};
 use crate::log::{Log, Queue};
 use crate::output::{give, require_file};
@@ -36,7 +36,9 @@ pub fn execute(arguments: &RunArguments) -> Result<(), Failure> {
     let ended = run(&config);
     drop(log);
     ended.map_err(|error| match error {
-        RunError::Channel(ChannelError::RootLength { .. }) => Failure::input(error),
+        RunError::Root(RootError::OfEnvironment(ChannelError::RootLength { .. })) => {
+            Failure::input(error)
+        }
         RunError::Setting(_) => Failure::Input(format!("{}: {error}", arguments.config.display())),
         error => Failure::work(error),
     })
