@@ -214,7 +214,7 @@ impl core::error::Error for StoppingError {}
 
 /// Longest part of a response in s; a freight train of 2 km takes about 90.
 const RESPONSE_MAX_S: f64 = 300.0;
-/// No brake decelerates by more, whatever carries it: the mass is in t, or the forces in another unit than N.
+/// No brake decelerates by more, on any track: the mass is in t, or the forces in another unit than N.
 const DECELERATION_MAX_MPS2: f64 = 10.0;
 
 /// How far each uncertain quantity is moved to its unfavourable side, in standard deviations.

@@ -140,11 +140,17 @@ impl AllRuns {
     /// Returns that the line is described from its other end.
     fn mirrored_line(&self) -> Option<DatasetDiagnostic> {
         let factor = mirrored_line(&self.balance?.0, &self.mirrored?)?;
-        let sign = if factor < 0.0 { ", with the other sign" } else { "" };
-        let text = format!(
-            "the train moves as on the line's gradients read from its other end{sign}: do the chainages of the \
-             track and the positions of the runs begin at the same end?"
-        );
+        let text = match factor {
+            ..0.0 => {
+                "the train moves as on the line's gradients read from its other end with the other sign: do the \
+                 chainages of the track and the positions of the runs begin at the same end, and does climbing \
+                 count as positive?"
+            }
+            _ => {
+                "the train moves as on the line's gradients read from its other end: do the chainages of the track \
+                 and the positions of the runs begin at the same end?"
+            }
+        };
         let figures = [("factor", factor.into())];
         Some(self.of_all(Diagnostic::new("mirrored_line", Severity::Fundamental, text, figures)))
     }

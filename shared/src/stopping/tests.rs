@@ -153,7 +153,7 @@ fn bad_input_is_named() {
     assert_eq!(named(Stop { mass_kg: 0.0, ..good }), "mass_kg");
     let in_t = Stop { mass_kg: 100.0, ..good };
     assert_eq!(named(in_t), "mass_kg");
-    // The adhesion limits the deceleration, whatever the brake's force.
+    // The adhesion limits the deceleration of a brake of any force.
     let carried = RailAdhesion::Coefficient(Uncertain::exact(0.1));
     assert!(Stop { adhesion: carried, ..in_t }.estimate(0.95).is_ok());
     assert_eq!(named(Stop { brake_effort: &[], ..good }), "brake_effort");

@@ -83,9 +83,7 @@ pub fn drive_run(physics: &TruePhysics<'_>, settings: &SimulatorSettings) -> Vec
         let (headwind_mps, temperature_degc) = weather.advance();
         let mass_kg = plan.mass_kg * disturbances.mass_factor(time_s, position_m);
         let now = SimulatedMoment { time_s, headwind_mps, temperature_degc, mass_kg };
-        let at = ((time_s * 1e9).round() as i64, 0);
-        let late_brake_n = late_brake.acting(at, Some([forces.brake_force_n]));
-        let brake_force_n = late_brake_n.map_or(forces.brake_force_n, |[force_n]| force_n);
+        let brake_force_n = acting_brake_n(&mut late_brake, time_s, forces.brake_force_n);
         let mut acting = late.advance(Controls { brake_force_n, ..forces });
         if let Some(cap) = &disturbances.adhesion {
             let weight_n = 1000.0 * TrainModel::weight_kn(mass_kg);
@@ -121,6 +119,13 @@ pub fn drive_run(physics: &TruePhysics<'_>, settings: &SimulatorSettings) -> Vec
         });
     }
     states
+}
+
+/// Returns the brake force in N that acts behind a line when this one is reported. It changes evenly between steps: the
+/// mean lateness is that of the line, to the last ms.
+fn acting_brake_n(late_brake: &mut DelayLine<1>, time_s: f64, reported_n: f64) -> f64 {
+    let at = ((time_s * 1e9).round() as i64, 0);
+    late_brake.acting(at, Some([reported_n])).map_or(reported_n, |[acting_n]| acting_n)
 }
 
 /// Gusts and the slow change of temperature.

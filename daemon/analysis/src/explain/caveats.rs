@@ -10,9 +10,8 @@ use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::{EffectKind, KindRow};
 use nalgebra::Cholesky;
 
-use super::answer::{DavisDeviations, EffectAnswer, Identifiability, PlaceUncertainty};
+use super::answer::{Course, DavisDeviations, EffectAnswer, Identifiability, PlaceUncertainty};
 use super::competing::separating_run;
-use super::course::Course;
 use super::effects::{Candidate, LIBRARY};
 use super::evidence::{Fit, FitProblem};
 use super::held_out::HeldOutEffect;

@@ -1,6 +1,6 @@
 //! Confirmation of effects by the holdout runs: whether they act in them too, and how large they are there.
 //!
-//! The fit runs contribute what they know of all other numbers, as surely as the answer states these, and nothing on the
+//! The fit runs contribute their information on all other numbers, as surely as the answer states these, and none on the
 //! effect itself: its numbers follow from the normal equations of the holdout runs and from that information.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -94,8 +94,8 @@ pub fn by_held_out_runs(
         let factor = Cholesky::new(information.clone())?;
         let left: Vec<RunNormal> = evidence.iter().map(|it| it.0.moved_by(&step)).collect();
         let known = enlarged_by_scatter(&factor.inverse(), &information, &left);
-        let [fitted, held_out] =
-            [&fitted.covariance, &known].map(|all| all.view((start, start), (size, size)).into_owned());
+        let [fitted, held_out] = [&fitted.covariance, &known]
+            .map(|all| all.view((start, start), (size, size)).into_owned());
         let is_shown = held_out.trace() < DEVIATION_TIMES_MAX.powi(2) * fitted.trace();
         let apart = step.rows(start, size).into_owned();
         let p_value = chance(&apart, &(fitted + held_out))?;

@@ -12,7 +12,7 @@
 //!   jointly with the usual errors
 //! - [`score`], [`stop_to_stop`]: open-loop prediction of fit and holdout runs, and the meaning of an effect
 //! - [`many`]: with many runs, some of them for the search, all of them for sizes and scores
-//! - [`course`], [`over_time`], [`held_out`]: numbers that differ between runs, and confirmation by the holdout runs
+//! - [`over_time`], [`held_out`]: numbers that differ between runs, and confirmation by the holdout runs
 //! - [`unexplained`], [`competing`], [`caveats`], [`verdict`], [`answer`]: the statement
 //! - [`report`]: further contents of a report
 //!
@@ -21,7 +21,6 @@
 pub mod answer;
 pub mod caveats;
 pub mod competing;
-pub mod course;
 pub mod effects;
 pub mod evidence;
 pub mod found_forces;

@@ -12,7 +12,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::course::{Course, CoursePart};
+use super::answer::{Course, CoursePart};
 use super::evidence::{Fit, FitProblem, RunNormal};
 use super::hypothesis::Hypothesis;
 

@@ -54,8 +54,8 @@ impl Unexplained {
         self.share < NOISE_SHARE_MAX
     }
 
-    /// Returns what it says against effects found where it is as large as the basic resistance itself, as on another line
-    /// than that of the runs: they take up some of it.
+    /// Returns its contradiction to the effects found where it is as large as the basic resistance itself, as on another
+    /// line than that of the runs: they take up some of it.
     pub fn contradiction(&self) -> Option<&'static str> {
         (self.share >= OUTWEIGHS_SHARE).then_some(
             "The force without a cause outweighs all that is found: check first that the line, the train and the runs \

@@ -55,8 +55,8 @@ const ALL_DEVIATIONS_MIN: f64 = 20.0;
 const SCATTER_SHARE_MAX: f64 = 0.4;
 /// A line that is read from its right end leaves less than this share of the scatter that it leaves from the wrong one.
 const MIRRORED_SCATTER_MAX: f64 = 0.7;
-/// Of the gradients (root mean square in ‰) of another line, the motion shows less than this share, with so many
-/// standard deviations.
+/// Gradients of another line are no flatter (root mean square in ‰), and the motion shows less than this share of them,
+/// with this number of standard deviations added.
 const OTHER_LINE_PERMILLE_MIN: f64 = 2.0;
 const OTHER_LINE_SHARE_MAX: f64 = 0.5;
 const OTHER_LINE_DEVIATIONS: f64 = 4.0;

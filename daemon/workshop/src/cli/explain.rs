@@ -267,13 +267,9 @@ const INDENT: usize = 12;
 pub fn text(answer: &ExplainAnswer) -> String {
     let mut text = diagnostics(&answer.diagnostics)
         + &plain(&[&answer.words.heading, &answer.words.left].map(String::as_str).concat());
-    let to_dos = effect_words::to_dos(&answer.effects);
-    for (at, effect) in answer.effects.iter().enumerate() {
+    for effect in &answer.effects {
         text += "\n";
         text += &found(effect);
-        // The last of several says it for all.
-        let own = to_dos.iter().filter(|(_, numbers)| numbers.last() == Some(&(at + 1)));
-        own.for_each(|(to_do, _)| text += &row("to do", to_do));
     }
     text += "\n";
     text += &limits(answer);
@@ -324,6 +320,9 @@ fn found(effect: &EffectAnswer) -> String {
         rows += &row("or else", &other.in_words());
     }
     rows += &row("sure", &effect_words::sureness(effect.p_value));
+    if let Some(to_do) = effect_words::to_do(effect) {
+        rows += &row("to do", to_do);
+    }
     rows
 }
 

@@ -7,7 +7,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use dynocar_analysis::dataset::{Dataset, Role};
 use dynocar_analysis::explain::Explanation;
-use dynocar_analysis::explain::answer::Verdict;
+use dynocar_analysis::explain::answer::{EffectAnswer, Verdict};
 use dynocar_analysis::explain::report::effect;
 use dynocar_analysis::explain::report::panels::Panel;
 use dynocar_core::plausibility::Severity;
@@ -133,19 +133,28 @@ fn verdict(subject: &Subject) -> String {
          <p class=\"sentence\">{}</p>\n",
         escape(&subject.data.sentence)
     );
-    let is_listed = answer.effects.len() > 1 && answer.verdict == Verdict::Effect;
-    if is_listed {
-        html += "<ol class=\"effects\">\n";
-        for effect in &answer.effects {
-            let _ = writeln!(html, "<li><p>{}</p></li>", escape(&effect::described(effect)));
+    let to_do = |effect: &EffectAnswer| {
+        let words = effect::to_do(effect)?.replace('`', "");
+        Some(format!("<p class=\"experiment\"><strong>To do:</strong> {}.</p>\n", escape(&words)))
+    };
+    match &answer.effects[..] {
+        several @ [_, _, ..] if answer.verdict == Verdict::Effect => {
+            html += "<ol class=\"effects\">\n";
+            for effect in several {
+                let (words, to_do) = (escape(&effect::described(effect)), to_do(effect));
+                let _ = writeln!(html, "<li><p>{words}</p>\n{}</li>", to_do.unwrap_or_default());
+            }
+            html += "</ol>\n";
         }
-        html += "</ol>\n";
-    }
-    for (words, numbers) in effect::to_dos(&answer.effects) {
-        let numbers: Vec<String> = numbers.iter().map(usize::to_string).collect();
-        let of = if is_listed { format!(" ({})", numbers.join(", ")) } else { String::new() };
-        let words = escape(&words.replace('`', ""));
-        let _ = writeln!(html, "<p class=\"experiment\"><strong>To do{of}:</strong> {words}.</p>");
+        others => {
+            let mut paragraphs: Vec<String> = Vec::new();
+            for paragraph in others.iter().filter_map(to_do) {
+                if !paragraphs.contains(&paragraph) {
+                    paragraphs.push(paragraph);
+                }
+            }
+            html += &paragraphs.concat();
+        }
     }
     for caveat in &answer.caveats {
         let _ = writeln!(html, "<p class=\"note\">{}</p>", escape(caveat));

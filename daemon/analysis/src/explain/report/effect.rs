@@ -260,18 +260,6 @@ pub fn place(effect: &EffectAnswer) -> String {
     located(&effect.place).or_else(covered).unwrap_or_else(|| "everywhere".into())
 }
 
-/// Returns the recommended actions of effects, each once, with the numbers of its effects from 1.
-pub fn to_dos(effects: &[EffectAnswer]) -> Vec<(&'static str, Vec<usize>)> {
-    let mut all: Vec<(&'static str, Vec<usize>)> = Vec::new();
-    for (at, words) in effects.iter().enumerate().filter_map(|(at, it)| Some((at, to_do(it)?))) {
-        match all.iter_mut().find(|(known, _)| *known == words) {
-            Some((_, numbers)) => numbers.push(at + 1),
-            None => all.push((words, vec![at + 1])),
-        }
-    }
-    all
-}
-
 /// Returns how well the ends of a place are known: half of the widest 95 % interval.
 fn precision(place: &Location) -> Option<String> {
     let known = place.uncertainty_95.as_ref()?;

@@ -124,16 +124,6 @@ fn an_effect_along_the_line_is_where_its_values_are_and_others_are_everywhere() 
 }
 
 #[test]
-fn what_several_effects_recommend_is_said_once() {
-    let of = |kind| effect(kind, Location::default(), [1.0, 0.1]);
-    let all = ["tunnel_drag", "dragging_brake", "tunnel_drag", "unknown"].map(of);
-    let said = to_dos(&all);
-    let numbers: Vec<&[usize]> = said.iter().map(|it| &it.1[..]).collect();
-    assert_eq!(numbers, [&[1, 3][..], &[2]]);
-    assert_eq!(Some(said[0].0), to_do(&all[0]));
-}
-
-#[test]
 fn contradicting_scales_are_stated_in_percent_with_their_intervals() {
     let [positions, motion] =
         [(1.015, 0.001), (1.003, 0.002)].map(|(value, std)| WithStd { value, std });
