@@ -113,6 +113,9 @@ pub fn diagnostics<'r>(
     diagnostics
 }
 
+/// Code of the diagnostic that the line may be another one than that of the runs.
+pub const OTHER_LINE: &str = "other_line";
+
 /// Sums over all runs: together they show faults that each is too short to show, as one from stop to stop.
 #[derive(Default)]
 struct AllRuns {
@@ -166,7 +169,7 @@ impl AllRuns {
             balance.gradient_rms_permille()
         );
         let figures = [("share", share.into())];
-        Some(self.of_all(Diagnostic::new("other_line", Severity::Warning, text, figures)))
+        Some(self.of_all(Diagnostic::new(OTHER_LINE, Severity::Warning, text, figures)))
     }
 
     fn of_all(&self, found: Diagnostic) -> DatasetDiagnostic {

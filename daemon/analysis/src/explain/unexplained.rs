@@ -2,6 +2,8 @@
 
 use super::answer::Location;
 use super::selection::{Refusal, Search, SearchOutcome};
+use crate::dataset::DatasetDiagnostic;
+use crate::dataset::dataset_diagnostic::OTHER_LINE;
 use dynocar_model::words::kind_name;
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -54,12 +56,14 @@ impl Unexplained {
         self.share < NOISE_SHARE_MAX
     }
 
-    /// Returns its contradiction to the effects found where it is as large as the basic resistance itself, as on another
-    /// line than that of the runs: they take up some of it.
-    pub fn contradiction(&self) -> Option<&'static str> {
-        (self.share >= OUTWEIGHS_SHARE).then_some(
-            "The force without a cause outweighs all that is found: check first that the line, the train and the runs \
-             belong together, and change no part before the cause is known.",
+    /// Returns its contradiction to the effects found where it is as large as the basic resistance itself, or the line is
+    /// in doubt: on another line than that of the runs they take up some of it.
+    pub fn contradiction(&self, diagnostics: &[DatasetDiagnostic]) -> Option<&'static str> {
+        let is_line_doubted = diagnostics.iter().any(|it| it.code == OTHER_LINE);
+        let is_contradicted = self.share >= OUTWEIGHS_SHARE || is_line_doubted && !self.is_noise();
+        is_contradicted.then_some(
+            "The effects found leave too large a force without a cause: check first that the line, the train and the \
+             runs belong together, and change no part before that cause is known.",
         )
     }
 

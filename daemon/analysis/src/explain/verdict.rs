@@ -52,7 +52,7 @@ pub fn answer(
     let competing = if is_unknown { Vec::new() } else { competing_hypotheses(search, outcome) };
     let left = Unexplained::new(search, outcome);
     let verdict = verdict(search, outcome, &competing, left.as_ref());
-    if let Some(words) = left.as_ref().and_then(Unexplained::contradiction) {
+    if let Some(words) = left.as_ref().and_then(|left| left.contradiction(&diagnostics)) {
         effects.iter_mut().for_each(|effect| effect.contradiction = Some(words.into()));
     }
     let is_enough = verdict != Verdict::InsufficientData;
