@@ -9,7 +9,7 @@ use super::normal::{HeightLayout, LineCourse};
 use super::observation::{BlockDifference, Prior, observations};
 use super::profile::{Altitude, ProfileEvidence, is_one_of_few};
 use super::recording::{RawRecording, RecordingPart, SurveyRecording, plane_of, recording_parts};
-use super::trips::{NotUsed, SurveyedStop, Trip, not_used, stands, stops, stops_of_both, trips};
+use super::trips::{NotUsed, SurveyedStop, Trip, not_used, stands, stops, trips};
 use crate::parallel;
 use crate::statistics::rms;
 
@@ -138,9 +138,7 @@ pub fn survey(
         None => Some(profile(&recordings, vehicle, &alignments, &trips, &wheels)?),
     };
     let not_used = not_used(&trips, &recordings);
-    let [growing, falling] =
-        [1, -1].map(|it| found_stops(&recordings, &alignments, &trips, (it, known.is_some())));
-    let stops = stops_of_both(growing, falling, vehicle.length_m);
+    let stops = found_stops(&recordings, &alignments, &trips, known.is_some());
     Ok(Survey { plane, alignments, trips, not_used, stops, wheels, scale_std, profile })
 }
 
@@ -157,21 +155,29 @@ impl Survey {
     }
 }
 
-/// Returns the stops of a direction, of all trips or those of the fit runs.
 fn found_stops(
     recordings: &[SurveyRecording],
     alignments: &Alignments,
     trips: &[Trip],
-    (direction, of_all): (i8, bool),
+    of_all: bool,
 ) -> Vec<SurveyedStop> {
-    let own = trips.iter().filter(|it| it.direction == direction && (of_all || it.is_fit));
-    let stands_of = |trip: &Trip| {
-        let along = trip.along.chainage_m.iter();
-        let chainage_m: Vec<f64> =
-            along.map(|&along_m| alignments.chainage_m(direction, along_m)).collect();
-        stands(recordings[trip.recording].raw, trip.along.first_row, &chainage_m)
-    };
-    stops(direction, &own.map(stands_of).collect::<Vec<_>>())
+    let mut found = Vec::new();
+    for direction in [1, -1] {
+        let own = trips.iter().filter(|it| it.direction == direction && (of_all || it.is_fit));
+        let passes: Vec<Vec<f64>> = own
+            .map(|trip| {
+                let chainage_m: Vec<f64> = trip
+                    .along
+                    .chainage_m
+                    .iter()
+                    .map(|&along_m| alignments.chainage_m(direction, along_m))
+                    .collect();
+                stands(recordings[trip.recording].raw, trip.along.first_row, &chainage_m)
+            })
+            .collect();
+        found.extend(stops(direction, &passes));
+    }
+    found
 }
 
 /// Returns the profile from the fit trips.

@@ -175,7 +175,7 @@ fn reason(recording: &SurveyRecording, rows: std::ops::Range<usize>) -> &'static
 /// Least time in s of a stop without open doors.
 const STAND_MIN_S: f64 = 8.0;
 /// Greatest distance in m between stands at the same stop.
-pub const SAME_STOP_M: f64 = 25.0;
+const SAME_STOP_M: f64 = 25.0;
 /// Least share of the passes that stand at a stop.
 const SHARE_MIN: f64 = 0.5;
 
@@ -186,10 +186,10 @@ pub struct SurveyedStop {
     pub chainage_m: f64,
     /// Name, empty where not known.
     pub name: String,
-    /// Standard deviation in m of the stands of a direction; absent for one stand.
+    /// Standard deviation in m of the stands; absent for one stand.
     pub std_m: Option<f64>,
-    /// Direction of travel; absent where trains of both stand.
-    pub direction: Option<i8>,
+    /// Direction of travel.
+    pub direction: i8,
     /// Number of stands.
     pub stands: usize,
 }
@@ -244,58 +244,12 @@ pub fn stops(direction: i8, passes: &[Vec<f64>]) -> Vec<SurveyedStop> {
         let squares: f64 = cluster.iter().map(|stand| (stand.0 - mean).powi(2)).sum();
         let std_m = (count > 1.0).then(|| (squares / (count - 1.0)).sqrt());
         let (name, stands) = (String::new(), cluster.len());
-        let direction = Some(direction);
         stops.push(SurveyedStop { chainage_m: mean, name, std_m, direction, stands });
     }
     stops
 }
 
-/// Returns the stops of both directions as one list in the order of the line: a station where trains of both stand is
-/// one stop, in the middle between the two, since trains stop at opposite ends of a platform.
-pub fn stops_of_both(
-    growing: Vec<SurveyedStop>,
-    falling: Vec<SurveyedStop>,
-    vehicle_m: f64,
-) -> Vec<SurveyedStop> {
-    let nearest = |all: &[SurveyedStop], to: &SurveyedStop| {
-        let away_m = |it: &SurveyedStop| (it.chainage_m - to.chainage_m).abs();
-        let near = all.iter().enumerate().map(|(at, it)| (at, away_m(it)));
-        let near = near.filter(|(_, away_m)| *away_m < SAME_STOP_M + vehicle_m);
-        near.min_by(|one, other| one.1.total_cmp(&other.1)).map(|(at, _)| at)
-    };
-    let other_of = |at: usize| {
-        let other = nearest(&falling, &growing[at])?;
-        (nearest(&growing, &falling[other]) == Some(at)).then_some(other)
-    };
-    let others: Vec<Option<usize>> = (0..growing.len()).map(other_of).collect();
-    let alone = (0..falling.len()).filter(|at| !others.contains(&Some(*at)));
-    let mut all: Vec<SurveyedStop> = alone.map(|at| falling[at].clone()).collect();
-    all.extend(growing.iter().zip(&others).map(|(stop, other)| match other {
-        Some(other) => stop.with(&falling[*other]),
-        None => stop.clone(),
-    }));
-    least_first(&mut all, |it| it.chainage_m);
-    all
-}
-
 impl SurveyedStop {
-    /// Returns the stop of both directions from this one and that of the other direction.
-    fn with(&self, other: &SurveyedStop) -> Self {
-        let squares = [self, other].map(|it| {
-            let degrees = it.stands as f64 - 1.0;
-            (it.std_m.map_or(0.0, |std_m| std_m.powi(2) * degrees), degrees)
-        });
-        let degrees = squares[0].1 + squares[1].1;
-        let variance = (squares[0].0 + squares[1].0) / degrees;
-        SurveyedStop {
-            chainage_m: 0.5 * (self.chainage_m + other.chainage_m),
-            name: self.name.clone(),
-            std_m: (degrees > 0.0).then(|| variance.sqrt()),
-            direction: None,
-            stands: self.stands + other.stands,
-        }
-    }
-
     /// Returns the chainage in m beyond which no train stands here.
     pub fn end_m(&self) -> f64 {
         self.chainage_m + self.std_m.map_or(SAME_STOP_M, |std_m| (2.0 * std_m).max(1.0))
@@ -313,24 +267,5 @@ mod tests {
         let at: Vec<f64> = stops.iter().map(|stop| stop.chainage_m).collect();
         assert_eq!(at, [100.0, 501.5]);
         assert!((stops[0].std_m.unwrap() - 1.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_station_of_both_directions_is_one_stop_in_its_middle() {
-        let growing = stops(1, &[vec![100.0, 500.0, 900.0], vec![102.0, 501.0, 900.0]]);
-        let falling = stops(-1, &[vec![940.0, 530.0, 300.0], vec![942.0, 532.0, 301.0]]);
-        let found = |vehicle_m| {
-            let stops = stops_of_both(growing.clone(), falling.clone(), vehicle_m);
-            stops.iter().map(|it| (it.chainage_m, it.direction, it.stands)).collect::<Vec<_>>()
-        };
-        let (first, back) = ((101.0, Some(1), 2), (300.5, Some(-1), 2));
-        assert_eq!(found(20.0), [first, back, (515.75, None, 4), (920.5, None, 4)]);
-        let apart = [(500.5, Some(1), 2), (531.0, Some(-1), 2)];
-        assert_eq!(found(5.0)[2..4], apart);
-        // The nearer of two has it.
-        let two = stops(1, &[vec![880.0, 930.0]]);
-        let one = stops_of_both(two, stops(-1, &[vec![940.0]]), 80.0);
-        assert_eq!(one.iter().map(|it| it.chainage_m).collect::<Vec<_>>(), [880.0, 935.0]);
-        assert_eq!((one[1].std_m, one[1].end_m()), (None, 935.0 + SAME_STOP_M));
     }
 }

@@ -200,9 +200,8 @@ fn map(survey: &Survey, answer: &SurveyAnswer) -> String {
         }
     }
     for stop in &answer.line.stops {
-        let direction = stop.direction.unwrap_or(1);
-        let Some(alignment) = alignments.of(direction) else { continue };
-        let (x, y) = place(alignment.at(alignments.along_m(direction, stop.chainage_m)));
+        let Some(alignment) = alignments.of(stop.direction) else { continue };
+        let (x, y) = place(alignment.at(alignments.along_m(stop.direction, stop.chainage_m)));
         let _ = writeln!(
             svg,
             "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"var(--ink)\"><title>{:.0} m {}\
@@ -259,7 +258,7 @@ fn learned(answer: &SurveyAnswer) -> String {
 const STOPS: &[TableColumn<'_, SurveyedStop>] = &[
     ("chainage, m", Numbers, &|it| format!("{:.1}", it.chainage_m)),
     ("name", Names, &|it| escape(&it.name)),
-    ("direction", Numbers, &|it| it.direction.map_or("both".into(), |it| it.to_string())),
+    ("direction", Numbers, &|it| it.direction.to_string()),
     ("stands", Numbers, &|it| it.stands.to_string()),
     ("scatter, m", Numbers, &|it| it.std_m.map_or("–".into(), &|it| format!("{it:.1}"))),
 ];

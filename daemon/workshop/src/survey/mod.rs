@@ -13,7 +13,7 @@ use dynocar::dataset::DatasetSource;
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::answer::WithStd;
 use dynocar_analysis::statistics::middle;
-use dynocar_analysis::survey::trips::{SAME_STOP_M, SurveyedStop};
+use dynocar_analysis::survey::trips::SurveyedStop;
 use dynocar_analysis::survey::{NotUsed, Survey, Trip, Vehicle, survey};
 use read::{Material, rows_in_order};
 use serde::Serialize;
@@ -22,6 +22,9 @@ use write::{gradient_entries, late_s, trip_file, write};
 use crate::dataset::load;
 
 pub use read::SurveyFailure;
+
+/// Distance in m below which a stop takes the name of a stop of the known line.
+const SAME_STOP_M: f64 = 25.0;
 
 /// A survey that was made and written.
 pub struct Surveyed {
@@ -52,7 +55,7 @@ pub fn survey_folder<'s>(
     let (recordings, vehicle) = (read::recordings(&raw), read::vehicle(&raw));
     let mut survey = survey(&recordings, &vehicle, known.as_ref().map(|(known, _)| known))?;
     if let Some((_, track)) = &known {
-        name_stops(&mut survey.stops, &track.survey.stops, vehicle.length_m);
+        name_stops(&mut survey.stops, &track.survey.stops);
     }
     let material = Material { source, dataset: &raw, vehicle: &vehicle, survey: &survey, line };
     let files = write(&material, out)?;
@@ -60,13 +63,12 @@ pub fn survey_folder<'s>(
     Ok(Surveyed { raw, survey, answer, files })
 }
 
-/// Stops of a known line keep their names. One direction's may lie half of a platform away from that of both.
-fn name_stops(stops: &mut [SurveyedStop], known: &[(f64, String)], vehicle_m: f64) {
-    let same_m = SAME_STOP_M + 0.5 * vehicle_m;
+/// Stops of a known line keep their names.
+fn name_stops(stops: &mut [SurveyedStop], known: &[(f64, String)]) {
     for stop in stops {
         let away = |known: &&(f64, String)| (known.0 - stop.chainage_m).abs();
         let nearest = known.iter().min_by(|one, other| away(one).total_cmp(&away(other)));
-        if let Some(nearest) = nearest.filter(|nearest| away(nearest) < same_m) {
+        if let Some(nearest) = nearest.filter(|nearest| away(nearest) < SAME_STOP_M) {
             stop.name.clone_from(&nearest.1);
         }
     }
