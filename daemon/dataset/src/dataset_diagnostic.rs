@@ -14,7 +14,9 @@ use serde::Serialize;
 use super::Dataset;
 use super::diagnostic::{Diagnostic, unusual_resistance};
 use super::keys::assign;
+use super::resolved::GradientSource;
 use super::run::Run;
+use super::speed_and_position::PositionSource;
 
 /// A diagnostic on a dataset.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -120,7 +122,8 @@ pub const OTHER_LINE: &str = "other_line";
 #[derive(Default)]
 struct AllRuns {
     balance: Option<(WindowBalance, Unit)>,
-    mirrored: Option<WindowBalance>,
+    /// Of the runs whose gradients are the line's at recorded positions: as it is, and read from its other end.
+    on_line: Option<[WindowBalance; 2]>,
     files: Vec<String>,
     has_fault: bool,
 }
@@ -129,7 +132,13 @@ impl AllRuns {
     fn push(&mut self, run: &Run) {
         let of_all = || (WindowBalance::of_all(), run.gradient_unit);
         self.balance.get_or_insert_with(of_all).0.add(&run.balance);
-        self.mirrored.get_or_insert_with(WindowBalance::of_all).add(&run.mirrored);
+        if run.gradient_source == GradientSource::Track
+            && run.position_source == PositionSource::Column
+        {
+            let [own, mirrored] = self.on_line.get_or_insert_with(|| [WindowBalance::of_all(); 2]);
+            own.add(&run.balance);
+            mirrored.add(&run.mirrored);
+        }
         self.files.push(run.file.clone());
         self.has_fault |= run.diagnostics.iter().any(|it| it.fault.is_some());
     }
@@ -142,7 +151,8 @@ impl AllRuns {
 
     /// Returns that the line is described from its other end.
     fn mirrored_line(&self) -> Option<DatasetDiagnostic> {
-        let factor = mirrored_line(&self.balance?.0, &self.mirrored?)?;
+        let [own, mirrored] = &self.on_line?;
+        let factor = mirrored_line(own, mirrored)?;
         let text = match factor {
             ..0.0 => {
                 "the train moves as on the line's gradients read from its other end with the other sign: do the \
@@ -160,8 +170,7 @@ impl AllRuns {
 
     /// Returns that the line is another one, where no run shows a fault that would hide it.
     fn other_line(&self) -> Option<DatasetDiagnostic> {
-        let is_mapped = self.mirrored.is_some_and(|it| it.windows() > 0.0);
-        let (balance, _) = self.balance.filter(|_| is_mapped && !self.has_fault)?;
+        let [balance, _] = self.on_line.filter(|_| !self.has_fault)?;
         let share = other_line(&balance)?;
         let text = format!(
             "of the track's gradients, {:.1} ‰ on average, hardly any shows in the motion of the train: is it the line \

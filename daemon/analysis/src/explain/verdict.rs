@@ -53,7 +53,9 @@ pub fn answer(
     let left = Unexplained::new(search, outcome);
     let verdict = verdict(search, outcome, &competing, left.as_ref());
     if let Some(words) = left.as_ref().and_then(|left| left.contradiction(&diagnostics)) {
-        effects.iter_mut().for_each(|effect| effect.contradiction = Some(words.into()));
+        for effect in &mut effects {
+            effect.contradiction.get_or_insert_with(|| words.into());
+        }
     }
     let is_enough = verdict != Verdict::InsufficientData;
     let identifiability = if is_enough { identifiability(search, outcome) } else { Vec::new() };
