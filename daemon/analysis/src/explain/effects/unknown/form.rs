@@ -9,6 +9,7 @@ use dynocar_model::terms::{ModelEntry, Parameter};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::known::{edges, fitted_numbers, is_exponent, named};
+use super::scale::ControlScale;
 use crate::explain::answer::{CovariateRange, Location, ParameterValue};
 use crate::explain::effects::{
     Candidate, Handling, Hypothesis, Nature, On, ReportContext, ReportedValues, SharedHypothesis,
@@ -40,6 +41,8 @@ pub struct FormForce {
     /// Least and greatest value of the last factor's covariate.
     span: [f64; 2],
     choice_cost: f64,
+    /// The control force that it follows, if any.
+    control: Option<ControlScale>,
 }
 
 /// Returns the price of a form that was chosen from `chosen_from` forms.
@@ -83,6 +86,7 @@ impl FormForce {
             place,
             span: ranges.last().map_or([0.0, 1.0], |&[_, low, high]| [low, high]),
             choice_cost: choice_cost(chosen_from) + sought as f64 * observations.ln(),
+            control: ControlScale::of(extra, scan),
         };
         Candidate::new(force, start)
     }
@@ -180,7 +184,9 @@ impl Hypothesis for FormForce {
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        let is_left_by_scale = |control: &ControlScale| control.is_left_by(&self.extra(parameters));
         (parameters[0] * self.greatest).abs() >= LEAST_N_PER_KN
+            && self.control.as_ref().is_none_or(is_left_by_scale)
     }
 
     fn place(&self) -> Location {
@@ -260,6 +266,7 @@ mod tests {
             place: Location { covariate, ..Location::default() },
             span: [0.0, 900.0],
             choice_cost: 0.0,
+            control: None,
         };
         let ends = force.ends();
         assert_eq!(ends[0].reach, Reach::Between(0.0, 500.0));
