@@ -86,6 +86,12 @@ impl NuisanceFit {
         size.abs() < HALF_95 * std
     }
 
+    /// Returns whether an effect is no larger than the usual errors of declared figures.
+    pub(super) fn is_immaterial(&self, index: usize) -> bool {
+        let parameters = self.fit.effect_parameters(index);
+        !self.fit.model.effects[index].is_material(parameters, self.fit.theta[2])
+    }
+
     /// Returns whether a change of mass in single runs is the usual scatter of loads: the largest of several deviations
     /// is about √(2 ln n) of their standard deviation, which the other runs show.
     pub(super) fn is_as_loads_are(&self, index: usize) -> bool {

@@ -4,6 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use dynocar_shared::vocabulary::EffectKind;
 
+use super::acceptance::is_possible;
 use super::outcome::{EffectTrial, discounted, penalty};
 use super::search::{RoundSteps, Search};
 use crate::explain::effects::{Candidate, Effect, LIBRARY, UNKNOWN};
@@ -41,6 +42,17 @@ pub(super) struct Asked<'a> {
 
 /// The best candidate of a kind, if any, by this kind or its forms; or why the data do not allow to test it.
 type Tried = (&'static Effect, Result<Option<EffectTrial>, String>);
+
+/// Returns whether a numbered attempt comes before another of the same kind. A form at a bound of its numbers is one of
+/// another form, and comes after all others that explain anything.
+fn is_better(own: &(usize, EffectTrial), other: &(usize, EffectTrial)) -> bool {
+    let rank = |(number, trial): &(usize, EffectTrial)| {
+        let is_form = trial.kind == EffectKind::Unknown && trial.bic_gain > 0.0;
+        (is_form && is_possible(trial), trial.bic_gain, *number)
+    };
+    let (own, other) = (rank(own), rank(other));
+    own.0.cmp(&other.0).then(own.1.total_cmp(&other.1)).then(own.2.cmp(&other.2)).is_gt()
+}
 
 /// Returns whether a trial would be more than chance with this multiple of the evidence: an error that all runs
 /// share does not become evident by another place or noise.
@@ -181,11 +193,7 @@ impl Search<'_> {
         parallel::of_each_owned(candidates, |number, candidate| {
             let tried = (number, self.attempt(base, onto, candidate));
             let mut best = best.lock().unwrap_or_else(PoisonError::into_inner);
-            let rank = |(number, trial): &(usize, EffectTrial)| (trial.bic_gain, *number);
-            let is_better = best.as_ref().is_none_or(|best| {
-                let (own, best) = (rank(&tried), rank(best));
-                own.0.total_cmp(&best.0).then(own.1.cmp(&best.1)).is_gt()
-            });
+            let is_better = best.as_ref().is_none_or(|best| is_better(&tried, best));
             if is_better {
                 *best = Some(tried);
             }
