@@ -9,7 +9,7 @@
 use std::time::{Duration, Instant};
 
 use dynocar_client::{Host, SamplePublisher, SnapshotReader, monotonic_now_ns};
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
 const CYCLE: Duration = Duration::from_millis(1);
@@ -21,7 +21,7 @@ const BUILT_IN: [f64; 3] = [1.498, 0.0147, 0.00086];
 
 fn built_in_force_n(speed_mps: f64) -> f64 {
     let [a, b, c] = BUILT_IN;
-    (a + speed_mps * (b + speed_mps * c)) * MASS_KG * STANDARD_GRAVITY_MPS2 / 1000.0
+    (a + speed_mps * (b + speed_mps * c)) * MASS_KG * GRAVITY_MPS2 / 1000.0
 }
 
 /// Returns the resistance in N, its source, and the reason for it.

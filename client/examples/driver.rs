@@ -8,7 +8,7 @@
 use std::time::Duration;
 
 use dynocar_client::{Host, SamplePublisher, SnapshotReader, monotonic_now_ns};
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use dynocar_shared::{Parameter, SampleField, TrainId, TrainSample};
 
 const CYCLE_S: f64 = 0.2;
@@ -42,7 +42,7 @@ impl Parameters {
     fn force_n(&self, acceleration_mps2: f64, speed_mps: f64) -> f64 {
         let [a, b, c] = self.davis;
         let w0_n_per_kn = a + speed_mps * (b + speed_mps * c);
-        let resistance_n = w0_n_per_kn * self.mass_kg * STANDARD_GRAVITY_MPS2 / 1000.0;
+        let resistance_n = w0_n_per_kn * self.mass_kg * GRAVITY_MPS2 / 1000.0;
         self.mass_kg * (1.0 + ROTATING_MASS_FACTOR) * acceleration_mps2 + resistance_n
     }
 

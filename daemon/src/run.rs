@@ -62,6 +62,14 @@ pub enum RunError {
         /// The system's answer.
         source: std::io::Error,
     },
+    /// The system gives no address to listen at.
+    #[error("metrics.listen = \"{address}\": {source}")]
+    Listen {
+        /// The address of the configuration.
+        address: SocketAddr,
+        /// The system's answer.
+        source: std::io::Error,
+    },
     /// A pipeline thread ended by itself.
     #[error("thread {0}: ended unexpectedly; the daemon stops so that a supervisor can restart it")]
     ThreadEnded(String),
@@ -289,7 +297,8 @@ fn start_metrics(
     stop: &Arc<AtomicBool>,
 ) -> Result<JoinHandle<()>, RunError> {
     let failed = |what| move |source| RunError::System { what, source };
-    let socket = listener::open(address).map_err(failed("metrics.listen"))?;
+    let refused = |source| RunError::Listen { address, source };
+    let socket = listener::open(address).map_err(refused)?;
     let trains: Vec<TrainId> = config.trains.iter().map(|train| train.id).collect();
     let names: Vec<String> = config.pipelines.iter().map(|it| it.name.clone()).collect();
     let (host, stop) = (host.clone(), Arc::clone(stop));

@@ -28,13 +28,13 @@ pub struct ResistanceEstimate {
 impl ResistanceEstimate {
     /// Returns the resistance in N and its standard deviation, for a train of `mass_kg`.
     pub fn force_n(&self, mass_kg: f64) -> (f64, f64) {
-        let weight_kn = mass_kg * STANDARD_GRAVITY_MPS2 / 1000.0;
+        let weight_kn = mass_kg * GRAVITY_MPS2 / 1000.0;
         (self.w0_n_per_kn * weight_kn, self.w0_std_n_per_kn * weight_kn)
     }
 }
 
 /// Gravity in m/s², as the declared model uses it.
-pub const STANDARD_GRAVITY_MPS2: f64 = 9.81;
+pub const GRAVITY_MPS2: f64 = 9.81;
 
 impl ParameterSnapshot {
     /// w0(v) = a + b v + c v² with its standard deviation from the full covariance.

@@ -10,7 +10,7 @@ mod motion;
 
 use crate::adhesion::{RailCondition, Uncertain};
 use crate::quantile::normal_quantile;
-use crate::resistance::STANDARD_GRAVITY_MPS2;
+use crate::resistance::GRAVITY_MPS2;
 use crate::snapshot::ParameterSnapshot;
 use crate::vocabulary::Parameter;
 
@@ -134,7 +134,7 @@ pub struct Stop<'a> {
     pub response: BrakeResponse,
     /// Adhesion of the rail.
     pub adhesion: RailAdhesion,
-    /// Gravity in m/s²: [`STANDARD_GRAVITY_MPS2`], but 9.8 in the papers.
+    /// Gravity in m/s²: [`GRAVITY_MPS2`], but 9.8 in the papers.
     pub gravity_mps2: f64,
 }
 
@@ -158,7 +158,7 @@ impl<'a> Stop<'a> {
             brake_scale: Uncertain::exact(1.0),
             response: BrakeResponse::IMMEDIATE,
             adhesion: RailAdhesion::Unlimited,
-            gravity_mps2: STANDARD_GRAVITY_MPS2,
+            gravity_mps2: GRAVITY_MPS2,
         }
     }
 }

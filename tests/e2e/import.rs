@@ -6,7 +6,7 @@ use std::path::Path;
 use dynocar::dataset::{load_track, load_train};
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use dynocar_tests::browser::Browser;
 use dynocar_tests::process::DaemonSite;
 
@@ -64,7 +64,7 @@ fn an_imported_train_is_read_back_with_the_numbers_of_its_source() {
 
     let site = DaemonSite::new();
     let printed = import(&site, "osrd_each_kg.json", &[]);
-    assert_close(train(&site).resistance.a, 8.0 / STANDARD_GRAVITY_MPS2);
+    assert_close(train(&site).resistance.a, 8.0 / GRAVITY_MPS2);
     assert!(printed.contains("for each kg: 4.49 N/kN at 40.0 m/s"), "{printed}");
     let site = DaemonSite::new();
     import(&site, "osrd_whole.json", &["--mode", "1500V", "--format", "osrd"]);
@@ -111,7 +111,7 @@ fn what_a_file_does_not_show_is_a_marked_default_unless_somebody_says_it() {
     assert!(!printed.contains("defaults"), "{printed}");
     let model = train(&site);
     assert_eq!((model.length_m, model.name.as_str()), (74.08, "T 1"));
-    assert_close(model.resistance.a, 2200.0 / (150.0 * STANDARD_GRAVITY_MPS2));
+    assert_close(model.resistance.a, 2200.0 / (150.0 * GRAVITY_MPS2));
 }
 
 #[test]

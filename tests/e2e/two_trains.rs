@@ -79,7 +79,8 @@ fn every_command_takes_the_train_that_is_named() {
         assert!(code == Some(2) && errors.contains("holds trains 1, 2"), "{command}: {errors}");
         let (code, _, errors) = of(&["--train", "3"]);
         assert!(
-            code == Some(2) && errors.contains("expected samples of train 3, found trains 1, 2"),
+            code == Some(2)
+                && errors.contains("expected samples of train 3; those in it are of 1, 2"),
             "{command}: {errors}"
         );
     }

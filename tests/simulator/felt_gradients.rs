@@ -4,7 +4,7 @@ use dynocar_analysis::dataset::{Dataset, GradientSource, PositionSource};
 use dynocar_analysis::explain::answer::{ExplainAnswer, Verdict};
 use dynocar_analysis::explain::explain;
 use dynocar_shared::SampleField;
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::random::{SimulatorRandom, Stream};
@@ -18,8 +18,8 @@ const NOISE_MPS2: f64 = 0.02;
 
 /// Returns the specific force at a state that is followed by another one, with a share of the gradient.
 fn felt_mps2(now: &TrueState, next: &TrueState, share: f64) -> f64 {
-    let gradient = now.resistance.gradient_n / (now.mass_kg * STANDARD_GRAVITY_MPS2);
-    (next.speed_mps - now.speed_mps) / TRUE_STEP_S + share * STANDARD_GRAVITY_MPS2 * gradient
+    let gradient = now.resistance.gradient_n / (now.mass_kg * GRAVITY_MPS2);
+    (next.speed_mps - now.speed_mps) / TRUE_STEP_S + share * GRAVITY_MPS2 * gradient
 }
 
 /// Returns a dataset without line and positions, with a share of the gradients; with brakes where they are kept.

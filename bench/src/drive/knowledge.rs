@@ -2,7 +2,7 @@
 
 use dynocar_model::train::{Davis, EffortCurve};
 use dynocar_shared::Uncertain;
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use dynocar_shared::stopping::{EffortPoint, RailAdhesion, Stop, StoppingError};
 
 /// The parameters by which a driver plans, brakes and bounds its stops. Forces are counted as the train
@@ -46,7 +46,7 @@ impl Knowledge {
 
     /// Returns the resistance and slope in N at a speed in m/s.
     pub fn resisting_n(&self, speed_mps: f64, slope_permille: f64) -> f64 {
-        let weight_kn = 1e-3 * self.mass_kg.value * STANDARD_GRAVITY_MPS2;
+        let weight_kn = 1e-3 * self.mass_kg.value * GRAVITY_MPS2;
         weight_kn * (self.davis.w0_n_per_kn(speed_mps) + slope_permille)
     }
 
@@ -68,7 +68,7 @@ impl Knowledge {
 
     /// Returns the deceleration in m/s² that brake and rail can give on the level at a speed in m/s.
     pub fn braking_max_mps2(&self, ability: &Ability, speed_mps: f64) -> f64 {
-        let weight_n = self.mass_kg.value * STANDARD_GRAVITY_MPS2;
+        let weight_n = self.mass_kg.value * GRAVITY_MPS2;
         let brake_n = ability.brake_max_n * self.brake_scale.value;
         let carried_n = match self.rail {
             None | Some(RailAdhesion::Unlimited) => f64::INFINITY,
@@ -153,6 +153,6 @@ pub(super) mod tests {
         let slippery = RailAdhesion::Coefficient(Uncertain::exact(0.06));
         let slippery = Knowledge { rail: Some(slippery), ..exact };
         let most = slippery.braking_max_mps2(&ability, 20.0);
-        assert!((most - 0.06 * STANDARD_GRAVITY_MPS2 / 1.06).abs() < 1e-12, "{most}");
+        assert!((most - 0.06 * GRAVITY_MPS2 / 1.06).abs() < 1e-12, "{most}");
     }
 }

@@ -8,7 +8,7 @@
 use dynocar::config::IdleStrategy;
 use dynocar_client::{Reading, SamplePublisher, SnapshotReader};
 use dynocar_model::train::{Davis, EffortCurve, TrainModel};
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use dynocar_shared::stopping::RailAdhesion;
 use dynocar_shared::{
     Parameter, ParameterSnapshot, PipelineKind, Quantity, TrainId, TrainSample, Uncertain,
@@ -193,7 +193,7 @@ pub fn learned<'a>(
         let davis = [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC];
         let [a, b, c] = davis.map(|parameter| snapshot.value(parameter).unwrap_or_default());
         // The estimated resistance is that of still air; the wind of the day is part of the unexplained force.
-        let weight_kn = 1e-3 * known.mass_kg.value * STANDARD_GRAVITY_MPS2;
+        let weight_kn = 1e-3 * known.mass_kg.value * GRAVITY_MPS2;
         let [unexplained, std] = [snapshot.unexplained_force_n, snapshot.unexplained_force_std_n]
             .map(|force_n| force_n / weight_kn);
         known.davis = Davis { a: a + unexplained, b, c };

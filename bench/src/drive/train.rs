@@ -5,7 +5,7 @@ use dynocar_core::pipeline::braking::intake::DeclaredGear;
 use dynocar_model::simulate::motion::{DeadTime, shown};
 use dynocar_model::simulate::motion::{SimulatedMotion, advance};
 use dynocar_model::train::{Davis, TrainModel};
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainId, TrainSample, Uncertain};
 use dynocar_tests::chance::Chance;
 
@@ -188,7 +188,7 @@ impl Train {
 
     /// Returns the acceleration in m/s² under a reported force in N at a distance and speed.
     fn acceleration_mps2(&self, reported_n: f64, at: SimulatedMotion) -> f64 {
-        let weight_n = self.mass_kg * STANDARD_GRAVITY_MPS2;
+        let weight_n = self.mass_kg * GRAVITY_MPS2;
         let force_n = match reported_n < 0.0 {
             true => {
                 let brake_n = -reported_n * self.brake_scale();

@@ -56,6 +56,8 @@ pub fn graded(
         };
         (truth != none).then_some(())?;
         let (value, deviation) = (own["parameters"][name].as_f64()?, own["std"][name].as_f64()?);
+        // A reference to which the others refer is no estimate.
+        (deviation != 0.0).then_some(())?;
         let error = (value - truth) / (truth - none);
         Some(ParameterGrade { name: name.into(), error, z: (value - truth) / deviation })
     };

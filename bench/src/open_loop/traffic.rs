@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use dynocar_tests::chance::Chance;
 
@@ -136,7 +136,7 @@ impl DrivenMotion {
         let resistance_n = (1.95 + 0.031 * speed_mps + 0.0042 * speed_mps * speed_mps)
             * MASS_KG
             * 1e-3
-            * STANDARD_GRAVITY_MPS2;
+            * GRAVITY_MPS2;
         let force_n = INERTIAL_MASS_KG * acceleration_mps2 + resistance_n;
         let brake_n = (-force_n).max(0.0);
         let mut sample = TrainSample::empty(self.train)

@@ -202,7 +202,7 @@ def test_a_train_of_a_recording_is_chosen(
     chosen = dynocar.identify(path, estimator="ls", train=1)
     only = dynocar.identify(path, estimator="ls")
     assert chosen.estimators[0].values.a == only.estimators[0].values.a
-    words = "expected samples of train 7, found trains 1"
+    words = "expected samples of train 7; those in it are of 1"
     assert words in dynocar.check(path, train=7).errors[0]
     asked: list[Any] = [dynocar.read_dataset, dynocar.identify, dynocar.explain]
     for ask in asked:

@@ -135,6 +135,11 @@ pub fn not_a_value(
         && parse_cell(&with_point, Marks::plain(b'.')).is_some()
     {
         format!("; for decimal commas {}", DECIMAL.advice("\",\""))
+    } else if mapping.format.is_none()
+        && layout.decimal == b','
+        && parse_cell(cell, Marks::plain(b'.')).is_some()
+    {
+        format!("; for decimal points {}", DECIMAL.advice("\".\""))
     } else if let Some(mark) = grouping(cell, layout) {
         format!("; for marks of thousands {}", GROUPS.advice(format!("{mark:?}")))
     } else if is_below_names && !layout.units_row {

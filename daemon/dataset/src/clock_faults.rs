@@ -5,6 +5,8 @@ use super::order::quantile;
 
 /// An hour, by which clocks are put forward and back.
 const HOUR_S: f64 = 3600.0;
+/// A clock of twelve hours begins again after these.
+pub(super) const HALF_DAY_S: f64 = 12.0 * HOUR_S;
 /// Greatest change in m/s of a moving train's speed over a step, in addition to that by its acceleration.
 const SPEED_STEP_MPS: f64 = 1.0;
 /// Speed in m/s above which a train moves, by the coarsest sensor.
@@ -74,7 +76,11 @@ fn set_back(times_s: &mut [f64], speed_mps: &[f64], step_s: f64) -> Vec<(usize, 
     for row in 1..times_s.len() {
         let ahead_s = times_s[row] - before_s;
         before_s = times_s[row];
-        let hour_s = if ahead_s > 0.0 { HOUR_S } else { -HOUR_S };
+        let hour_s = match ahead_s {
+            0.0.. => HOUR_S,
+            _ if ahead_s < -0.5 * HALF_DAY_S => -HALF_DAY_S,
+            _ => -HOUR_S,
+        };
         let is_hour = (ahead_s - hour_s - step_s).abs() <= 1.5 * step_s.max(0.4);
         let (from, to) = (speed_mps[row - 1], speed_mps[row]);
         let goes_on = (to - from).abs() <= SPEED_STEP_MPS + ACCELERATION_MPS2 * step_s;

@@ -5,6 +5,7 @@ use dynocar_core::plausibility::{DetectedFault, DetectedFaults, InputFault};
 use dynocar_model::train::PowerTrain;
 use toml::Value;
 
+use super::clock_faults::HALF_DAY_S;
 use super::diagnostic::{Diagnostic, implausible_columns, read_as};
 use super::force_faults::force_faults;
 use super::forces::{Force, ForceSource};
@@ -131,9 +132,11 @@ fn of_clock(run: &Resolved, diagnostics: &mut Vec<Diagnostic>) {
     let faults = &run.clock_faults;
     for &(row, jump_s) in &faults.jumps {
         let (line, way) = (run.table.line(row), if jump_s < 0.0 { "back" } else { "forward" });
+        let is_half_day = jump_s.abs() == HALF_DAY_S;
+        let cause = if is_half_day { "a clock of twelve hours" } else { "summer time" };
         let text = format!(
-            "the clock went {way} by {:.0} s in line {line} while the train went on: summer time? The rows \
-             from there are read as if it had not",
+            "the clock went {way} by {:.0} s in line {line} while the train went on: {cause}? The rows from there \
+             are read as if it had not",
             jump_s.abs()
         );
         let figures = [("line", Value::Integer(line as i64)), ("jump_s", jump_s.into())];
@@ -161,8 +164,7 @@ fn of_clock(run: &Resolved, diagnostics: &mut Vec<Diagnostic>) {
     }
     if run.table.lines.notes > 0 {
         let count = run.table.lines.notes;
-        let text =
-            format!("{count} lines between or below the rows hold words alone: they are left out");
+        let text = format!("lines of words alone between or below the rows, left out: {count}");
         diagnostics.push(Diagnostic::new("notes_left_out", Info, text, [of_count(count)]));
     }
 }

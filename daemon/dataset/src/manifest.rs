@@ -239,7 +239,11 @@ fn columns(section: &Item) -> Result<Vec<ColumnMapping>, DatasetError> {
 }
 
 fn mapping(columns: &Item, quantity: Quantity) -> Result<ColumnMapping, DatasetError> {
-    let section = columns.need_table(quantity.name())?;
+    let section = columns.need(quantity.name(), "a table")?;
+    if !section.is_map() {
+        let unit = UNIT.assign(&format!("\"{}\"", Unit::base_of(quantity.dimension()).name()));
+        return Err(section.wrong_type(&keys::inline([of_any(COLUMN), unit])));
+    }
     let is_time = quantity == Quantity::Time;
     let known = keys::column::KEYS.iter().filter(|it| is_time || it.name != FORMAT.name);
     allow(&section, &known.copied().collect::<Vec<_>>())?;

@@ -10,7 +10,7 @@ use dynocar_core::plausibility::{DetectedFaults, gradient_fault};
 use dynocar_model::force::ForceResolver;
 use dynocar_model::terms::wheel::STILL_MPS;
 use dynocar_model::track::Track;
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use dynocar_shared::{RejectionReason, SampleField, TrainSample};
 use serde::{Serialize, Serializer};
 
@@ -357,7 +357,7 @@ impl MirroredLine {
             let middle_m = self.line_m - 0.5 * (from_m + to_m);
             let permille = self.track.gradient_permille(middle_m, self.train_m).unwrap_or(0.0);
             let climb = -1e-3 * f64::from(sample.direction) * permille;
-            let gradient_mps2 = STANDARD_GRAVITY_MPS2 * climb;
+            let gradient_mps2 = GRAVITY_MPS2 * climb;
             self.balance.push(&WindowMean { gradient_mps2, ..*window });
         }
         if window.is_some() || self.from_m.is_none() {

@@ -33,6 +33,13 @@ pub struct HealthArguments {
 /// The worst verdict of all trains unless it is ok; an unusable configuration or directory.
 pub fn execute(arguments: &HealthArguments) -> Result<(), Failure> {
     let config = arguments.config.as_deref().map(DaemonConfig::load).transpose()?;
+    if let (Some(train), Some(config)) = (arguments.train, &config)
+        && !config.trains.iter().any(|it| it.id == TrainId(train))
+    {
+        let own: Vec<String> = config.trains.iter().map(|it| it.id.to_string()).collect();
+        let words = format!("--train {train}: the configuration has {}", own.join(", "));
+        return Err(Failure::input(words));
+    }
     let host = DaemonConfig::host_of(config.as_ref()).map_err(Failure::work)?;
     let trains: Vec<TrainId> = match (arguments.train, &config) {
         (Some(train), _) => vec![TrainId(train)],

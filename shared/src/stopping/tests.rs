@@ -1,7 +1,7 @@
 //! Stopping distances against closed forms, the papers' figures and sampled stops.
 
 use crate::quantile::normal_quantile;
-use crate::resistance::STANDARD_GRAVITY_MPS2;
+use crate::resistance::GRAVITY_MPS2;
 use crate::snapshot::packed_index;
 use crate::{
     BrakeResponse, EffortPoint, Parameter, ParameterSnapshot, RailAdhesion, RailCondition, Stop,
@@ -248,7 +248,7 @@ fn a_train_on_a_slope_gains_speed_before_the_brake_comes() {
         Stop { gradient_permille: -20.0, response, ..stop }.estimate(0.9).unwrap().distance_m
     };
     let free = BrakeResponse { dead_time_s: 10.0, ..BrakeResponse::IMMEDIATE };
-    let (gains, least) = (0.0200 * STANDARD_GRAVITY_MPS2, 1.0 - 0.0200 * STANDARD_GRAVITY_MPS2);
+    let (gains, least) = (0.0200 * GRAVITY_MPS2, 1.0 - 0.0200 * GRAVITY_MPS2);
     let faster = 20.0 + 10.0 * gains;
     let expected_m = 10.0 * 0.5 * (20.0 + faster) + faster * faster / (2.0 * least);
     assert!((slope(free) - expected_m).abs() < 1e-6);
@@ -259,7 +259,7 @@ fn a_train_on_a_slope_gains_speed_before_the_brake_comes() {
     let uphill = Stop { gradient_permille: 30.0, ..Stop::level(2.0, 1e5, NO_RESISTANCE, &effort) };
     let slow = BrakeResponse { build_up_s: 1e2, ..BrakeResponse::IMMEDIATE };
     let stands = Stop { response: slow, ..uphill }.estimate(0.9).unwrap();
-    let by_the_slope_m = 4.0 / (2.0 * 0.030 * STANDARD_GRAVITY_MPS2);
+    let by_the_slope_m = 4.0 / (2.0 * 0.030 * GRAVITY_MPS2);
     assert!(stands.distance_m < by_the_slope_m && stands.distance_m > 0.7 * by_the_slope_m);
 }
 
@@ -301,7 +301,7 @@ impl Braked {
             acting_mps2 += (grown_mps2 - acting_mps2) * (step_s / self.lag_s).min(1.0);
             let [a, b, c] = self.davis;
             let w0 = a + speed_mps * (b + speed_mps * c);
-            let slope_mps2 = 1e-3 * STANDARD_GRAVITY_MPS2 * (w0 + gradient_permille);
+            let slope_mps2 = 1e-3 * GRAVITY_MPS2 * (w0 + gradient_permille);
             let brake_mps2 = acting_mps2 * (1.0 + self.brake_std * force_off);
             speed_mps -= step_s * (brake_mps2 + slope_mps2);
             distance_m += step_s * speed_mps.max(0.0);

@@ -3,7 +3,7 @@
 use dynocar_core::filter::Gaussian;
 use dynocar_estimators::wang::force_model::SpeedBasis;
 use dynocar_model::train::Davis;
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use nalgebra::{Matrix3, Matrix4, SMatrix, SVector, Vector4};
 
 use super::ride::{GUST_STD_MPS, GUST_TIME_S, MEAN_WIND_STD_MPS, speed_variance};
@@ -67,7 +67,7 @@ fn leg_information(
     leg: &[ShuttleMoment],
     basis: &SpeedBasis,
 ) -> SMatrix<f64, UNKNOWNS, UNKNOWNS> {
-    let per_n_per_kn = 1e-3 * STANDARD_GRAVITY_MPS2;
+    let per_n_per_kn = 1e-3 * GRAVITY_MPS2;
     let mut sensitivity = SVector::<f64, WITH_START>::zeros();
     sensitivity[UNKNOWNS] = 1.0;
     let mut whole = SMatrix::<f64, WITH_START, WITH_START>::zeros();
@@ -101,7 +101,7 @@ fn leg_information(
 ///
 /// State: speed, inverse mass, mean wind, gust.
 pub fn mass_std_in_wind(shuttle: &Shuttle, leg: &[ShuttleMoment]) -> f64 {
-    let per_n_per_kn = 1e-3 * STANDARD_GRAVITY_MPS2;
+    let per_n_per_kn = 1e-3 * GRAVITY_MPS2;
     let std = Vector4::new(10.0, 1.0, MEAN_WIND_STD_MPS, GUST_STD_MPS);
     let mut filter = Gaussian::independent(Vector4::zeros(), std);
     let keep = (-PERIOD_S / GUST_TIME_S).exp();

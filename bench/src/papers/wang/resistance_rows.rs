@@ -9,7 +9,7 @@ use dynocar_estimators::wang::{
 };
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{Davis, TrainModel};
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use dynocar_tests::chance::Chance;
 use nalgebra::Vector3;
 
@@ -203,7 +203,7 @@ impl PrintedDescent {
         let mean = |value: fn(&KnownMotion) -> f64| 0.5 * (value(&from) + value(&to));
         let acceleration_mps2 = (to.speed_mps - from.speed_mps) / step_s;
         let specific_mps2 = mean(|at| at.force_n) / to.declared_kg - acceleration_mps2;
-        let target = 1e3 * specific_mps2 / STANDARD_GRAVITY_MPS2 - mean(|at| at.known_n_per_kn);
+        let target = 1e3 * specific_mps2 / GRAVITY_MPS2 - mean(|at| at.known_n_per_kn);
         self.learn(section, mean(|at| at.speed_mps), target);
     }
 

@@ -10,7 +10,7 @@ use dynocar_estimators::wang::{
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::simulate::motion::deceleration_mps2;
 use dynocar_model::simulate::motion::{autoregressed, quantised, shown, slewed};
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use dynocar_tests::chance::Chance;
 
@@ -257,7 +257,7 @@ pub fn presumed(seed: u64) -> impl FnMut(f64) -> f64 {
     let keep = model.keep(PERIOD_S);
     move |speed_mps| {
         bias_mps2 = keep * bias_mps2 + model.noise_variance(keep).sqrt() * random.normal();
-        -1e3 / STANDARD_GRAVITY_MPS2 * model.shape(speed_mps) * bias_mps2
+        -1e3 / GRAVITY_MPS2 * model.shape(speed_mps) * bias_mps2
     }
 }
 

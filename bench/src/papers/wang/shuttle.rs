@@ -8,7 +8,7 @@ use std::sync::Arc;
 use dynocar_model::simulate::motion::{SimulatedMotion, advance};
 use dynocar_model::track::{Track, TrackCurve, Tunnel};
 use dynocar_model::train::{Davis, EffortCurve, TrainModel};
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use dynocar_tests::chance::Chance;
 
 use crate::statistics::KMH;
@@ -120,7 +120,7 @@ impl Shuttle {
         let w = self.sum(at.position_m, |davis| davis.w0_n_per_kn(at.speed_mps))
             + at.direction * gradient.unwrap_or(0.0)
             + extra_n_per_kn;
-        (at.force_n / at.mass_kg - 1e-3 * STANDARD_GRAVITY_MPS2 * w) / self.inertia_factor
+        (at.force_n / at.mass_kg - 1e-3 * GRAVITY_MPS2 * w) / self.inertia_factor
     }
 
     /// One sampling period further, the force linear between `from.force_n` and `to_n`.

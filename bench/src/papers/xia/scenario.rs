@@ -13,6 +13,7 @@ use dynocar_model::force::mps2_per_n_per_kn;
 use dynocar_model::simulate::motion::autoregressed;
 use dynocar_model::track::{Track, TrackCurve};
 use dynocar_model::train::Davis;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use dynocar_tests::chance::Chance;
 use nalgebra::{DMatrix, Matrix3};
 
@@ -33,8 +34,6 @@ pub const SPEED_NOISE_MPS: f64 = 0.18;
 pub const DISTURBANCE_N_PER_KN: f64 = 0.25;
 /// Its correlation time in s.
 pub const DISTURBANCE_S: f64 = 5.0;
-
-const GRAVITY_MPS2: f64 = 9.81;
 
 /// The truth of Table 3's cases 1 to 4.
 ///

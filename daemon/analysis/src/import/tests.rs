@@ -1,6 +1,6 @@
 //! Imports of whole files, each number checked.
 
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 
 use super::*;
 
@@ -174,7 +174,7 @@ fn a_ttobench_train_is_read_by_its_units() {
     let train = &read(TRAIN).trains[0];
     assert_eq!((train.mass_kg, train.cars, train.length_m), (Some(150e3), Some(4), None));
     assert_close(&[train.rotating_mass_factor.unwrap()], &[0.08]);
-    let weight_kn = 150.0 * STANDARD_GRAVITY_MPS2;
+    let weight_kn = 150.0 * GRAVITY_MPS2;
     assert_close(&davis(train), &[2200.0 / weight_kn, 36.0 / weight_kn, 6.48 / weight_kn]);
     let effort = train.traction.as_ref().unwrap();
     assert_close(&flat(&effort[..2]), &[0.0, 180e3, 40.0 / 3.0, 180e3]);
@@ -194,14 +194,14 @@ fn a_ttobench_train_is_read_by_its_units() {
 #[test]
 fn davis_coefficients_are_reported_by_their_size() {
     let tram = &read(TRAM).trains[0];
-    let weight_kn = 80.0 * STANDARD_GRAVITY_MPS2;
+    let weight_kn = 80.0 * GRAVITY_MPS2;
     assert_close(&davis(tram), &[1200.0 / weight_kn, 90.0 / weight_kn, 1.4 / weight_kn]);
     assert_close(&[tram.rotating_mass_factor.unwrap(), tram.length_m.unwrap()], &[0.05, 42.0]);
     let printed = format!("{:?}", tram.account.outcomes());
     assert!(printed.contains("for the whole train: 3.24 N/kN at 12.5 m/s"), "{printed}");
     assert_eq!(reason(&tram.account, "hoverboards"), "not understood");
     let express = &read(EXPRESS).trains[0];
-    let each = |value: f64| 1000.0 * value / STANDARD_GRAVITY_MPS2;
+    let each = |value: f64| 1000.0 * value / GRAVITY_MPS2;
     assert_close(&davis(express), &[each(0.008), each(0.0003), each(0.000015)]);
     let printed = format!("{:?}", express.account.outcomes());
     assert!(printed.contains("for each kg: 4.49 N/kN at 40.0 m/s"), "{printed}");

@@ -2,7 +2,7 @@
 
 use dynocar_model::terms::gradient;
 use dynocar_model::terms::wheel::STANDING_MPS;
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::{SampleField, TrainSample};
 use serde::Serialize;
@@ -155,7 +155,7 @@ fn level(curve: &mut DecelerationCurve, samples: &[TrainSample], dataset: &Datas
     let permille: Vec<f64> = samples.iter().map(at).collect::<Option<_>>()?;
     let inertia = 1.0 + train.rotating_mass_factor;
     for (point, permille) in curve.points.iter_mut().zip(&permille) {
-        point.deceleration_mps2 -= 1e-3 * STANDARD_GRAVITY_MPS2 * permille / inertia;
+        point.deceleration_mps2 -= 1e-3 * GRAVITY_MPS2 * permille / inertia;
     }
     Some(permille.iter().sum::<f64>() / permille.len() as f64)
 }

@@ -9,6 +9,7 @@
 //!
 //! Resistance, mass, passengers and the time offset are unknown, and the same in all passes of a vehicle.
 
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use nalgebra::{SMatrix, SVector};
 
 use super::chainage::Chained;
@@ -136,9 +137,6 @@ fn observe(
         passengers: raw.passengers.get(row).copied().unwrap_or(0.0),
     })
 }
-
-/// Acceleration of gravity in m/s².
-pub const GRAVITY_MPS2: f64 = 9.81;
 
 /// The common unknowns: a, b, c in N/kN (v in m/s), the factor on the declared mass less 1, the time in s by which
 /// forces act before their time stamps, and the mass of a passenger in kg.

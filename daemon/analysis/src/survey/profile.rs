@@ -5,9 +5,11 @@
 //! heights make a banded system, the few common unknowns its border; the mass of each pass is fitted in turns, so that
 //! the work grows linearly with the number of passes.
 
+use dynocar_shared::resistance::GRAVITY_MPS2;
+
 use super::banded::NotPositive;
 use super::normal::{HEIGHT_STEP_M, HeightLayout, LineCourse, Normal};
-use super::observation::{BlockDifference, Common, GRAVITY_MPS2, Prior};
+use super::observation::{BlockDifference, Common, Prior};
 use crate::parallel;
 use crate::statistics::middle;
 

@@ -26,7 +26,7 @@ pub mod window_balance;
 pub use input_fault::{DetectedFault, InputFault, Severity};
 
 use arrayvec::ArrayVec;
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 
 use crate::pipeline::admission::limits::MASS;
 use watch::Figures;
@@ -230,7 +230,7 @@ pub fn gradient_fault(all: &WindowBalance) -> Option<DetectedFault> {
     if !is_known || factor < 0.0 || !is_outside(factor, GRADIENT_FACTORS) {
         return None;
     }
-    let of_gradients_mps2 = 1e-3 * STANDARD_GRAVITY_MPS2 * all.gradient_rms_permille();
+    let of_gradients_mps2 = 1e-3 * GRAVITY_MPS2 * all.gradient_rms_permille();
     let left_mps2 = of_gradients_mps2 * (1.0 - factor * factor).max(0.0).sqrt();
     let is_scale = factor > 1.0 || scatter_mps2 < SCATTER_SHARE_MAX * left_mps2;
     is_scale.then_some(DetectedFault { fault: InputFault::GradientScale, factor: 1.0 / factor })

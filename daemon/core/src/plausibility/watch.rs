@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use dynocar_model::train::TrainModel;
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainSample};
 
 use super::window_balance::{Slopes, WindowBalance, WindowMean};
@@ -213,7 +213,7 @@ impl PlausibilityWatch {
         window.elapsed_s += step_s;
         window.traction_mps += 0.5 * (before.0 + after.0) / mass_kg * step_s;
         window.brake_mps += 0.5 * (before.1 + after.1) / mass_kg * step_s;
-        window.gradient_mps += 1e-3 * STANDARD_GRAVITY_MPS2 * self.gradient_permille * step_s;
+        window.gradient_mps += 1e-3 * GRAVITY_MPS2 * self.gradient_permille * step_s;
         window.travelled_m += 0.5 * (last.speed_mps + now.speed_mps) * step_s;
         // The margin keeps rounded times from lengthening a window.
         if window.elapsed_s < WINDOW_S * (1.0 - 1e-6) {

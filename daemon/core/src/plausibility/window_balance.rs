@@ -4,7 +4,7 @@
 //! factors of traction T, brake B and gradient i are 1. The resistance p + q v² is free, so that only pronounced
 //! accelerations reveal the forces and a wrong declared resistance changes nothing.
 
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use nalgebra::{SMatrix, SVector};
 
 /// Traction, brake, gradient, 1, v².
@@ -127,7 +127,7 @@ impl WindowBalance {
 
     /// Returns the root mean square of the gradients in ‰.
     pub fn gradient_rms_permille(&self) -> f64 {
-        1e3 / STANDARD_GRAVITY_MPS2 * (self.gram[(2, 2)] / self.windows.max(1.0)).sqrt()
+        1e3 / GRAVITY_MPS2 * (self.gram[(2, 2)] / self.windows.max(1.0)).sqrt()
     }
 
     /// Returns the factors by least squares, as far as the motion determines them.

@@ -8,6 +8,9 @@ use super::facts::Facts;
 use super::guessed::{GivenColumn, GuessedColumn, Unmapped};
 use super::matching::{UNKNOWN_UNIT, are_alike, can_hold, consider, figures};
 use super::name::named_unit;
+use dynocar_model::units::Unit;
+
+use crate::error::unknown;
 use crate::{DatasetError, Quantity, SourcePosition};
 
 /// Logarithm of the ratio of a position's span to the integrated speed that gaps and wear explain.
@@ -69,7 +72,13 @@ impl<'c> Assignment<'c> {
             candidates: Vec::new(),
             refused: Vec::new(),
         };
-        for it in given {
+        for (number, it) in given.iter().enumerate() {
+            let twice = given[..number].iter().find(|other| other.quantity == it.quantity);
+            if let Some(other) = twice {
+                let (quantity, one, two) = (it.quantity, &other.column, &it.column);
+                let words = format!("{quantity} is given twice: as column '{one}' and as '{two}'");
+                return Err(SourcePosition::whole(label).problem(words));
+            }
             let place = || SourcePosition::line(label, columns.layout.text.skip_rows + 1);
             assignment.take_given(it, columns).map_err(|words| place().problem(words))?;
         }
@@ -107,6 +116,11 @@ impl<'c> Assignment<'c> {
         let (name, quantity) = (&given.column, given.quantity);
         let index = self.columns.iter().position(|column| column.name.text == given.column.trim());
         let Some(index) = index else {
+            let is_column = |name: &str| self.columns.iter().any(|it| it.name.text == name.trim());
+            if let Some((_, unit)) = name.rsplit_once(':').filter(|it| is_column(it.0)) {
+                let units = Unit::of(quantity.dimension()).map(|it| it.name());
+                return Err(unknown("unit", unit, &format!(" for {quantity}"), units));
+            }
             let names = columns.names();
             return Err(format!("no column '{name}' for {quantity}; the columns: {names}"));
         };

@@ -79,7 +79,7 @@ pub struct Facts {
     pub max: f64,
     /// The first cell that is a date and nothing else, counted in days from 1970-01-01.
     pub day: Option<i64>,
-    /// Readers of the formats in which every cell so far is a time, the likeliest first.
+    /// Readers of the formats in which the cells so far are times, the likeliest first.
     clocks: Vec<DayClock>,
     packed: Option<Packed>,
     last: f64,
@@ -90,6 +90,8 @@ pub struct Facts {
     steps: Spread,
 }
 
+/// Times that show a column of times.
+const TIMES_MIN: usize = 20;
 /// Steps that show that the newest row stands first.
 const FALLING_MIN: usize = 20;
 
@@ -116,9 +118,9 @@ impl Facts {
         }
     }
 
-    /// Returns whether every cell so far was empty or a time.
+    /// Returns whether every cell so far was empty or a time, but for words among many times.
     fn may_hold_times(&self) -> bool {
-        self.text.is_none() && (self.numbers == 0 || !self.clocks.is_empty())
+        !self.clocks.is_empty() || (self.text.is_none() && self.numbers == 0)
     }
 
     /// Returns a cell's time in the likeliest format that holds for all cells so far.
@@ -127,18 +129,18 @@ impl Facts {
             self.day = self.day.or_else(|| day_of_cell(cell));
             self.clocks = TimeFormat::of_cell(cell).iter().map(DayClock::new).collect();
         }
-        let mut times_s = Vec::new();
-        let mut clocks = std::mem::take(&mut self.clocks);
-        clocks.retain_mut(|clock| {
-            let time_s = clock.seconds(cell);
-            times_s.extend(time_s);
-            time_s.is_some()
-        });
-        self.clocks = clocks;
-        times_s.first().copied()
+        let times_s: Vec<Option<f64>> =
+            self.clocks.iter_mut().map(|clock| clock.seconds(cell)).collect();
+        let first_s = times_s.iter().flatten().next().copied();
+        // A word among times, as in a row of totals, says nothing of their format.
+        if first_s.is_some() || self.numbers < TIMES_MIN {
+            let mut times_s = times_s.iter();
+            self.clocks.retain(|_| times_s.next().is_some_and(Option::is_some));
+        }
+        first_s
     }
 
-    /// Returns the formats in which every value is a time, the likeliest first; none for numbers.
+    /// Returns the formats in which the values are times, the likeliest first; none for numbers.
     pub fn formats(&self) -> Vec<&TimeFormat> {
         self.clocks.iter().map(DayClock::format).collect()
     }

@@ -204,7 +204,8 @@ fn mistakes_are_named_with_line_and_choices() {
         ),
         (
             ("gradient = { column = \"i\", unit = \"%\" }", "gradient = \"i\""),
-            "dataset.toml:14: columns.gradient: expected a table, got the text \"i\"",
+            "dataset.toml:14: columns.gradient: expected { column = \"…\", unit = \"permille\" }, got the text \
+             \"i\"",
         ),
     ];
     for ((from, to), expected) in cases {

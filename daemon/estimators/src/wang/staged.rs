@@ -10,7 +10,7 @@ use dynocar_core::pipeline::{Estimator, Outcome};
 use dynocar_core::settings;
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{Davis, TrainModel};
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use dynocar_shared::{Manoeuvre, ParameterSnapshot, PipelineKind, Reason, Status};
 use nalgebra::{Matrix4, SVector, Vector4};
 use serde::Deserialize;
@@ -145,14 +145,14 @@ impl StagedDescent {
         if self.learned >= self.settings.resistance_samples {
             let at = KnownMotion { speed_mps, known_n_per_kn: known, ..*to };
             let w = self.resistance().w_n_per_kn(&at, speed_mps);
-            return self.learn_mass(force_n, inertia_mps2 + 1e-3 * STANDARD_GRAVITY_MPS2 * w);
+            return self.learn_mass(force_n, inertia_mps2 + 1e-3 * GRAVITY_MPS2 * w);
         }
         self.learned += 1;
         let Some(section) = LearningSet::new(from, to) else { return Outcome::Used };
         // Eq. (11), (12) and (18), uphill positive where the text has it negative, G in N and
         // the resistance per kN of it, and the rotating mass that (18) leaves out.
         let specific_mps2 = force_n / to.declared_kg - inertia_mps2;
-        let target = 1e3 * specific_mps2 / STANDARD_GRAVITY_MPS2 - known;
+        let target = 1e3 * specific_mps2 / GRAVITY_MPS2 - known;
         self.descend(section, speed_mps, target, to);
         Outcome::Updated
     }
@@ -186,7 +186,7 @@ impl StagedDescent {
     /// `specific_mps2` is force over mass as the motion shows it.
     fn learn_mass(&mut self, force_n: f64, specific_mps2: f64) -> Outcome {
         let push_mps2 = force_n / self.inertia.reference_mass_kg;
-        if push_mps2.abs() < 1e-3 * STANDARD_GRAVITY_MPS2 * self.settings.force_min_n_per_kn {
+        if push_mps2.abs() < 1e-3 * GRAVITY_MPS2 * self.settings.force_min_n_per_kn {
             return Outcome::Used;
         }
         match self.settings.mass_regression {

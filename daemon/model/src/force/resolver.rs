@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::{SampleField, TrainSample};
 
@@ -365,6 +365,6 @@ impl ForceResolver {
             return None;
         }
         let acceleration_mps2 = (valid.sample.speed_mps - last_speed_mps) / valid.step_s;
-        Some(1000.0 * (specific_force_mps2 - acceleration_mps2) / STANDARD_GRAVITY_MPS2)
+        Some(1000.0 * (specific_force_mps2 - acceleration_mps2) / GRAVITY_MPS2)
     }
 }

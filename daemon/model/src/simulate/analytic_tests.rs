@@ -1,6 +1,6 @@
 //! The open-loop simulation against closed-form solutions.
 
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use proptest::prelude::*;
 
 use super::recording::tests::{coasting_sample, recorded};
@@ -14,7 +14,7 @@ const DAVIS: Davis = Davis { a: 1.5, b: 0.02, c: 0.004 };
 /// dv/dt = -(p + q v + r v²) with 4 p r > q² has v = (w tan(phi0 - w t / 2) - q) / (2 r), where
 /// w = sqrt(4 p r - q²) and tan(phi0) = (2 r v0 + q) / w.
 fn coasted_speed_mps(davis: Davis, gradient_permille: f64, start_mps: f64, time_s: f64) -> f64 {
-    let per_inertia = STANDARD_GRAVITY_MPS2 / 1000.0 / 1.06;
+    let per_inertia = GRAVITY_MPS2 / 1000.0 / 1.06;
     let (p, q, r) =
         (per_inertia * (davis.a + gradient_permille), per_inertia * davis.b, per_inertia * davis.c);
     let w = (4.0 * p * r - q * q).sqrt();

@@ -1,6 +1,6 @@
 //! A recorded run, prepared for simulation, and the accelerating forces at its samples.
 
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 
 use crate::force::{ForceBalance, ResolvedSample};
 use crate::train::Davis;
@@ -212,7 +212,7 @@ fn is_held(sample: &ResolvedSample) -> bool {
 /// False for a train that, standing, is held by a brake, reported or not.
 pub fn is_pulled(sample: &ResolvedSample) -> bool {
     let traction_n = sample.traction_force_n.unwrap_or(0.0);
-    !(traction_n < REST_TRACTION_MPS2 * sample.weight_kn * 1000.0 / STANDARD_GRAVITY_MPS2)
+    !(traction_n < REST_TRACTION_MPS2 * sample.weight_kn * 1000.0 / GRAVITY_MPS2)
 }
 
 /// The acceleration of a train at each sample of a recorded run, for any speed.

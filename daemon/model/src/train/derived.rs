@@ -1,6 +1,6 @@
 //! Quantities derived from a declared train: forces, weights, loads and speeds.
 
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 
 use super::EffortCurve;
 use super::numbers::{DRIVE_EFFICIENCY, Davis, FrictionBrake, PowerTrain, TrainModel};
@@ -41,7 +41,7 @@ impl TrainModel {
 
     /// Returns the weight in kN of a mass in kg.
     pub fn weight_kn(mass_kg: f64) -> f64 {
-        mass_kg * STANDARD_GRAVITY_MPS2 / 1000.0
+        mass_kg * GRAVITY_MPS2 / 1000.0
     }
 
     /// Returns the highest speed in m/s of the effort curves; `None` without curves.

@@ -128,7 +128,7 @@ fn studied(
     if let (true, Some(law)) = (arguments.without_resistance, &mut study.law) {
         let train = &datasets[0].train;
         law.take_out(|speed_mps| {
-            1e-3 * dynocar_shared::resistance::STANDARD_GRAVITY_MPS2
+            1e-3 * dynocar_shared::resistance::GRAVITY_MPS2
                 * train.resistance.w0_n_per_kn(speed_mps)
                 / (1.0 + train.rotating_mass_factor)
         });

@@ -65,7 +65,7 @@ pub enum NoDataset {
         trains: String,
     },
     /// It holds another train.
-    #[error("expected samples of train {wanted}, found trains {trains}")]
+    #[error("expected samples of train {wanted}; those in it are of {trains}")]
     NoSuchTrain {
         /// The train asked for.
         wanted: u64,

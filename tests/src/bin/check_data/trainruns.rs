@@ -10,7 +10,7 @@ use std::path::Path;
 use dynocar_model::simulate::motion::SimulatedMotion;
 use dynocar_model::track::Track;
 use dynocar_model::train::{BrakeGear, Davis, EffortCurve, TrainModel};
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use dynocar_tests::simulator::driving::{Controls, TrainOnLine, drive};
 
 use super::Report;
@@ -128,7 +128,7 @@ fn running_time_s(train: &TheirTrain, effort: &[Vec<f64>], sections: &[Vec<f64>]
         extra: Vec::new(),
     };
     let effort = EffortCurve::new(effort.iter().map(|row| (row[0] / 3.6, row[1])).collect())?;
-    let scale = THEIR_GRAVITY_MPS2 / STANDARD_GRAVITY_MPS2;
+    let scale = THEIR_GRAVITY_MPS2 / GRAVITY_MPS2;
     let mut gradient: Vec<_> = sections.iter().map(|row| (row[0], row[2] * scale)).collect();
     gradient.dedup_by(|later, earlier| later.0 == earlier.0);
     let track = Track::new(String::new(), None, Some(&gradient), None, None).ok()?;

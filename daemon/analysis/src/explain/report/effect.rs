@@ -90,7 +90,7 @@ pub fn sizes(parameters: &Values, std: &Values) -> Vec<String> {
                         let time = if is_one {
                             String::new()
                         } else {
-                            format!(" from {t_start_s:.0} to {t_end_s:.0} s")
+                            format!(" from {:.0} to {t_end_s:.0} s", t_start_s.round() + 0.0)
                         };
                         format!("{change} in {run}{time}")
                     },
@@ -226,8 +226,9 @@ pub fn located(place: &Location) -> Option<String> {
         parts.push(words::stretches(intervals));
     }
     if let Some(windows) = &place.windows {
-        let all = in_order(windows, |w| (&w.run, w.t_start_s))
-            .map(|w| format!("in {} from {:.0} to {:.0} s", w.run, w.t_start_s, w.t_end_s));
+        let all = in_order(windows, |w| (&w.run, w.t_start_s)).map(|w| {
+            format!("in {} from {:.0} to {:.0} s", w.run, w.t_start_s.round() + 0.0, w.t_end_s)
+        });
         parts.push(listed(all.collect()));
     }
     if let Some(runs) = &place.runs {

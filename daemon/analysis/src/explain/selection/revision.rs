@@ -91,12 +91,12 @@ impl Search<'_> {
         is_better
     }
 
-    /// Drops effects that the others have made needless, unless one of the others would then have impossible parameters
+    /// Drops effects that the others, or the noise that is left beside them, have made needless, unless one of the others would then have impossible parameters
     /// (winds that blow against every train instead of a tunnel's drag), and effects that have such parameters
     /// themselves.
     pub(super) fn prune(&self, outcome: &mut SearchOutcome) {
         let mut index = 0;
-        while index < outcome.fit.model.effects.len() && outcome.fit.model.effects.len() > 1 {
+        while index < outcome.fit.model.effects.len() {
             let fit = &outcome.fit;
             if !outcome.is_on_trial(fit.model.effects[index].kind()) {
                 index += 1;

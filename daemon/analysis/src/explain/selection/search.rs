@@ -140,8 +140,8 @@ impl Search<'_> {
             if next.model.effects.len() > 1 {
                 (self.progress)(round_share(outcome.rounds.len(), 0.0), "swapping effects");
                 self.swap(outcome, round.clone());
-                self.prune(outcome);
             }
+            self.prune(outcome);
             // An effect that others replaced, and which then left themselves, is better than no effect.
             if outcome.kinds() == before && Self::total(&next) < Self::total(&outcome.fit) - EQUAL {
                 outcome.fit = next;

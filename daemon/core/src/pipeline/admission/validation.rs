@@ -6,7 +6,7 @@
 //! refusing for ever.
 
 use dynocar_model::force::ValidSample;
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use dynocar_shared::{RejectionReason, SampleField, TrainId, TrainSample};
 
 use super::limits::{
@@ -170,7 +170,7 @@ impl Validator {
         if MASS.is_passed(mass_kg, self.nominal_mass_kg) {
             return Err(RejectionReason::MassOutOfRange);
         }
-        let weight_n = mass_kg * STANDARD_GRAVITY_MPS2;
+        let weight_n = mass_kg * GRAVITY_MPS2;
         let forces = [SampleField::TractionForce, SampleField::BrakeForce];
         let mut forces_n = forces.into_iter().filter_map(|field| sample.get(field));
         if forces_n.any(|force_n| FORCE.is_passed(force_n, weight_n)) {

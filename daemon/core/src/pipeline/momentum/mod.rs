@@ -12,7 +12,7 @@
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::Davis;
 use dynocar_shared::RejectionReason;
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use nalgebra::{SMatrix, SVector, Vector2, Vector3};
 use serde::Deserialize;
 
@@ -242,7 +242,7 @@ impl UnitSample {
             traction: per_weight(sample.traction_force_n)?,
             brake: per_weight(sample.brake_force_n)?,
             known: sample.known_n_per_kn().ok_or(RejectionReason::Missing)?,
-            inertia: 1000.0 * sample.inertial_mass_kg / (sample.mass_kg * STANDARD_GRAVITY_MPS2),
+            inertia: 1000.0 * sample.inertial_mass_kg / (sample.mass_kg * GRAVITY_MPS2),
         })
     }
 

@@ -2,7 +2,7 @@
 
 use dynocar_core::pipeline::Pipeline;
 use dynocar_estimators::EstimatorSettings;
-use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use dynocar_shared::{Parameter, ParameterSnapshot, Status, TrainId, TrainSample};
 
 use super::drive::{DAVIS, FRICTION, MASS_KG, Phase, train};
@@ -58,7 +58,7 @@ pub fn run(settings: &EstimatorSettings, samples: &[(TrainSample, Phase)]) -> Fo
     let mut carried = 0.0;
     for (index, (sample, phase)) in samples.iter().enumerate() {
         if *phase == Phase::Braking {
-            carried = sample.brake_force_n / (STANDARD_GRAVITY_MPS2 * MASS_KG);
+            carried = sample.brake_force_n / (GRAVITY_MPS2 * MASS_KG);
         }
         let snapshot = pipeline.process(sample);
         found.looks += 1;

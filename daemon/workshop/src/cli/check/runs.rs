@@ -11,11 +11,10 @@ use dynocar::dataset::FileKind;
 use dynocar::output::{report_line, write_in_folder};
 use dynocar_analysis::dataset::quality::{QuantityCount, ReasonCount};
 use dynocar_analysis::dataset::{
-    DatasetDiagnostic, DatasetError, Manifest, Phases, Quantity, Role, Run, RunQuality,
+    DatasetDiagnostic, DatasetError, Diagnostic, Manifest, Phases, Quantity, Role, Run, RunQuality,
     dataset_diagnostic, formats,
 };
 use dynocar_analysis::explain::report::residual_line::AlongLine;
-use dynocar_core::plausibility::InputFault;
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 
@@ -156,12 +155,11 @@ fn diagnostics(manifest: &Manifest, runs: &[Read], of_dataset: &[DatasetDiagnost
         let run = runs.iter().flatten().find(|run| run.file == *file);
         run.map_or_else(String::new, |run| run.number.to_string())
     };
-    let is_input_fault = |diagnostic: &&DatasetDiagnostic| {
-        InputFault::ALL.iter().any(|fault| fault.name() == diagnostic.code)
+    let is_of_one_run = |diagnostic: &DatasetDiagnostic| {
+        let own = runs.iter().flatten().flat_map(own_diagnostics);
+        own.into_iter().any(|it| it.text == diagnostic.text)
     };
-    let reported_first = of_dataset
-        .iter()
-        .filter(|diagnostic| diagnostic.runs.is_empty() || is_input_fault(diagnostic));
+    let reported_first = of_dataset.iter().filter(|diagnostic| !is_of_one_run(diagnostic));
     let mut diagnostics: Groups<String> = reported_first
         .map(|diagnostic| (diagnostic.text.clone(), diagnostic.runs.iter().map(number).collect()))
         .collect();
@@ -230,9 +228,13 @@ fn diagnostics_of(manifest: &Manifest, run: &Run) -> Vec<String> {
     if !quality.order.is_regular {
         diagnostics.push("the time step varies, so that missing rows cannot be counted".into());
     }
-    let by_run = run.diagnostics.iter().filter(|diagnostic| diagnostic.fault.is_none());
-    diagnostics.extend(by_run.map(|diagnostic| diagnostic.text.clone()));
+    diagnostics.extend(own_diagnostics(run).map(|diagnostic| diagnostic.text.clone()));
     diagnostics
+}
+
+/// Returns the diagnostics of a run by itself: a fault of the input is told of all runs that show it.
+fn own_diagnostics(run: &Run) -> impl Iterator<Item = &Diagnostic> {
+    run.diagnostics.iter().filter(|diagnostic| diagnostic.fault.is_none())
 }
 
 /// Understanding of a path: the contents of a file of this kind, and all that belongs to it.

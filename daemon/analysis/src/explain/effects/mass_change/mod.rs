@@ -75,6 +75,27 @@ fn part_tuple(scan: &Scan, part: &FactorPart) -> Tuple {
     sum
 }
 
+/// Returns the decrease of the cost by another mass over whole runs, and its factor less 1, by the runs' own factors on
+/// the control force: these take such a mass up, and leave the scan hardly a trace of it. `None` of a part that begins
+/// or ends within a run.
+fn of_whole_runs(scan: &Scan, part: &FactorPart) -> Option<(f64, f64)> {
+    let mut factors = Vec::new();
+    for (index, run) in scan.problem.runs.iter().enumerate().filter(|(_, run)| part.is_in(run)) {
+        let mut held = run.bins.iter().map(|bin| part.holds(run, bin.middle()));
+        let is_first_held = held.next()?;
+        if held.any(|is_held| is_held != is_first_held) {
+            return None;
+        }
+        if is_first_held {
+            factors.push(scan.fit.own_factors(index)[0]);
+        }
+    }
+    let count = factors.len() as f64;
+    let mean = factors.iter().sum::<f64>() / count;
+    let deviations = mean / scan.fit.noise.scatter.force;
+    (count > 0.0).then(|| (count * deviations * deviations, -mean / (1.0 + mean)))
+}
+
 /// Every row of neighbouring parts whose ends carry a force, with the sum of their tuples.
 fn joined(
     elementary: &[Tuple],
@@ -146,7 +167,9 @@ fn grow(scan: &Scan, parts: &[(FactorPart, Tuple)]) -> Vec<Candidate> {
     let best = |scan: &Scan, tuples: &mut dyn Iterator<Item = (FactorPart, Tuple)>| {
         tuples
             .map(|(part, tuple)| {
-                let (gain, estimate) = scan.gain(&tuple);
+                let by_scan = scan.gain(&tuple);
+                let of_runs = of_whole_runs(scan, &part).filter(|it| it.0 > by_scan.0);
+                let (gain, estimate) = of_runs.unwrap_or(by_scan);
                 (gain, estimate, part)
             })
             .filter(|(_, estimate, _)| estimate.abs() > LEAST_SHARE)
