@@ -6,6 +6,7 @@ mod common_to_runs;
 mod couplings;
 mod drive_power;
 mod effects;
+mod far_declarations;
 mod felt_gradients;
 mod files;
 mod fits;

@@ -184,7 +184,7 @@ mod tests {
     #[test]
     fn an_hour_forward_or_back_is_taken_out_where_the_train_goes_on() {
         let times = grid(400);
-        for hour_s in [HOUR_S, -HOUR_S] {
+        for hour_s in [HOUR_S, -HOUR_S, -HALF_DAY_S] {
             let put: Vec<f64> = times
                 .iter()
                 .enumerate()

@@ -73,7 +73,7 @@ pub fn number(value: f64, uncertainty: Option<f64>) -> String {
     let decimals = (1.0 - leading).clamp(0.0, 9.0) as usize;
     let text = format!("{value:.decimals$}");
     if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') {
-        return text.trim_start_matches('-').into();
+        return if scale.is_some() { text.trim_start_matches('-').into() } else { "0".into() };
     }
     text.replacen('-', "−", 1)
 }
@@ -155,6 +155,7 @@ mod tests {
 
     #[test]
     fn numbers_show_two_digits_of_their_uncertainty() {
+        assert_eq!([number(0.0, None), number(0.0, Some(0.02))], ["0", "0.000"]);
         assert_eq!(number(3058.57, Some(210.7)), "3059");
         assert_eq!(number(5.32302, Some(0.19)), "5.32");
         assert_eq!(number(-0.005154, Some(0.00038)), "−0.00515");

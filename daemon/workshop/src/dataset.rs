@@ -12,6 +12,7 @@ use dynocar::storage::{Disk, settle};
 use dynocar::text_file::require_regular;
 use dynocar_analysis::dataset::{
     Dataset, DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE, Manifest, RunContent,
+    SourcePosition,
 };
 use dynocar_analysis::explain::report::timeline::Timeline;
 use dynocar_analysis::identify::published_samples;
@@ -181,10 +182,13 @@ pub enum FromDatasetError {
     #[error(transparent)]
     Rows(#[from] RowError),
     /// A file lies elsewhere, so that it would not come back to its place.
-    #[error("{label}: names {file:?}: expected a path below the dataset's folder")]
+    #[error(
+        "{place}: names {file:?}: expected a path below the dataset's folder, since a recording holds its files: copy \
+         it there, and name the copy"
+    )]
     Outside {
-        /// The manifest.
-        label: String,
+        /// Where the manifest names it.
+        place: SourcePosition,
         /// The path.
         file: String,
     },
@@ -212,14 +216,19 @@ impl From<FromDatasetError> for Failure {
 pub fn from_dataset(folder: &Path, path: &Path) -> Result<usize, FromDatasetError> {
     let (files, head) = open(folder)?;
     let manifest = &head.manifest;
-    let mut names = vec![MANIFEST_FILE.to_owned(), manifest.train_file.path.clone()];
-    names.extend(manifest.track_file.iter().map(|it| it.path.clone()));
-    names.extend(manifest.runs.iter().map(|it| it.file.clone()));
+    let described = [&manifest.train_file].into_iter().chain(&manifest.track_file);
+    let named: Vec<(&String, &SourcePosition)> = described
+        .map(|it| (&it.path, &it.place))
+        .chain(manifest.runs.iter().map(|it| (&it.file, &it.place)))
+        .collect();
     let is_plain = |it: Component| matches!(it, Component::Normal(_));
-    if let Some(file) = names.iter().find(|it| !Path::new(it).components().all(is_plain)) {
-        let (label, file) = (files.label(MANIFEST_FILE), file.clone());
-        return Err(FromDatasetError::Outside { label, file });
+    let is_outside = |name: &String| !Path::new(name).components().all(is_plain);
+    if let Some((file, place)) = named.iter().find(|it| is_outside(it.0)) {
+        let (file, place) = (file.to_string(), (*place).clone());
+        return Err(FromDatasetError::Outside { place, file });
     }
+    let mut names = vec![MANIFEST_FILE.to_owned()];
+    names.extend(named.into_iter().map(|it| it.0.clone()));
     let dataset = head.read(&files).map_err(LoadError::from)?;
     // They were read a moment ago.
     let contents: Vec<(String, Vec<u8>)> =

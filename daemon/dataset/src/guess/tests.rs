@@ -323,6 +323,25 @@ fn what_is_reported_is_taken_for_granted() {
     assert_eq!(message, "a.csv:1: no column 'C' for time; the columns: 'A', 'B', 'v'");
     let message = refused(given(Time, "v", None));
     assert!(message.contains("column 'v' cannot be time: its values do not grow"), "{message}");
+    let message = refused(given(Speed, "B:kmh", None));
+    assert!(
+        message.starts_with("a.csv:1: unknown unit 'kmh' for speed; did you mean"),
+        "{message}"
+    );
+    let twice = [given(Speed, "B", kmh), given(Speed, "v", None)];
+    let message = guess(&files, &twice, GivenMarks::default()).unwrap_err().to_string();
+    assert_eq!(message, "a.csv: speed is given twice: as column 'B' and as 'v'");
+}
+
+#[test]
+fn a_row_of_totals_leaves_times_times() {
+    let mut text = file("Zeit,v", |row| {
+        let [minute, second] = [row[0] / 60.0, row[0] % 60.0].map(f64::floor);
+        vec![format!("07:{:02}:{second:02}", minute % 60.0), row[2].to_string()]
+    });
+    text += "Summe,900\n";
+    let time = guessed(&text).column(Time).cloned().unwrap();
+    assert_eq!(time.format, Some(TimeFormat::Clock));
 }
 
 #[test]

@@ -77,6 +77,9 @@ fn a_cell_that_is_no_number_is_named_with_line_and_column() {
         "a.csv:2: column 'v': expected a number or an empty cell, got '1,5'; for decimal \
          commas set decimal = \",\" in [dataset]"
     );
+    let marks = "delimiter = \";\"\ndecimal = \",\"";
+    let message = table(marks, "t;v\n0;1,5\n1;2.5\n").unwrap_err();
+    assert!(message.ends_with("for decimal points set decimal = \".\" in [dataset]"), "{message}");
     let message = table("", "t,v\n0,1\n1,fast").unwrap_err();
     assert!(message.contains("got 'fast'"), "a word is no number that was cut off: {message}");
     let message = table("", "t,v\n0,1e\n1,2\n").unwrap_err();

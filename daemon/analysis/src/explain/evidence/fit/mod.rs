@@ -29,13 +29,12 @@ pub use prior::{Positions, RunPositions};
 /// Standard deviation of the declared a, b, c as a share of their size: a weak prior that separates directions which
 /// the runs do not excite.
 const PRIOR_SHARE: [f64; 3] = [0.4, 0.8, 0.4];
-/// Degrees of freedom of Student's t distribution of the errors of declared a, b, c, and number of fits by which the
-/// deviations are found.
+/// Degrees of freedom of Student's t distribution of the errors of declared a, b, c: most are small, and some far larger
+/// than normal errors are.
 const DECLARED_FREEDOM: f64 = 4.0;
-const TOLERANCE_TURNS: usize = 3;
 /// A declared coefficient is wrong by at most this many standard deviations; data that ask for more, or for a
 /// resistance below zero, show a force that the basic resistance does not have.
-const DECLARED_DEVIATIONS_MAX: f64 = 4.0;
+const DECLARED_DEVIATIONS_MAX: f64 = 8.0;
 /// Greatest share of its prior deviation by which a coefficient may fall below zero: an error of estimation.
 const BELOW_NONE_MAX: f64 = 0.25;
 /// Standard deviation of a coefficient that is held at its bound, as a share of its prior deviation.
@@ -235,7 +234,7 @@ impl FitProblem {
     pub fn of(dataset: &Dataset, density: Density) -> Result<(Self, Vec<RunData>), RunDataError> {
         let runs = prepare_at(dataset, density)?.into_iter();
         let (fit, held_out) = runs.partition(|run| run.role == Role::Fit);
-        Ok((FitProblem::new(fit, dataset.train.resistance).as_tolerant_as_needed(), held_out))
+        Ok((FitProblem::new(fit, dataset.train.resistance), held_out))
     }
 
     /// The problem of fitting these runs around declared Davis coefficients.
@@ -256,24 +255,6 @@ impl FitProblem {
             declared_responses,
             positions,
         }
-    }
-
-    /// Returns the problem with deviations of the declared a, b, c for which their errors are usual: declarations are
-    /// seldom far off, and more often so than normal errors are. Their errors have Student's t distribution, whose
-    /// deviations follow from the errors.
-    fn as_tolerant_as_needed(mut self) -> Self {
-        let own = self.prior_deviation;
-        let declared = [self.declared.a, self.declared.b, self.declared.c];
-        for _ in 0..TOLERANCE_TURNS {
-            let fit = self.fit_from_declared(&UpdatedModel::default(), &[]);
-            let wider = |i: usize| {
-                let away = (fit.theta[i] - declared[i]) / own[i];
-                let variance = (DECLARED_FREEDOM + away * away) / (DECLARED_FREEDOM + 1.0);
-                own[i] * variance.sqrt().max(1.0)
-            };
-            self.prior_deviation = [0, 1, 2].map(wider);
-        }
-        self
     }
 
     /// Returns the part of the line, in m of chainage, over which the fitted runs of a direction go: effects were

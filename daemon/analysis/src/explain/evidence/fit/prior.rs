@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::super::model::UpdatedModel;
 use super::super::positions::pooled_s;
 use super::super::run_data::RunData;
-use super::{FitProblem, RunNormal};
+use super::{DECLARED_FREEDOM, FitProblem, RunNormal};
 use crate::statistics::median;
 
 /// Evidence of the positions of runs on their speeds.
@@ -88,6 +88,14 @@ impl Positions {
     }
 }
 
+/// Returns the cost of a declaration that is so many standard deviations off, and the weight by which its pull is less
+/// than that of a normal error: by Student's t distribution, whose middle is that of the normal one.
+fn declared_cost(deviations: f64) -> (f64, f64) {
+    let count = DECLARED_FREEDOM + 1.0;
+    let share = deviations * deviations / count;
+    (count * share.ln_1p(), 1.0 / (1.0 + share))
+}
+
 impl FitProblem {
     /// Pull of the prior: information and score.
     pub(super) fn prior(
@@ -100,11 +108,12 @@ impl FitProblem {
         let mut cost = 0.0;
         let declared = [self.declared.a, self.declared.b, self.declared.c];
         for i in 0..3 {
-            let weight = self.prior_deviation[i].powi(-2);
             let away = declared[i] - theta[i];
+            let (own_cost, weight) = declared_cost(away / self.prior_deviation[i]);
+            let weight = weight * self.prior_deviation[i].powi(-2);
             information[(i, i)] += weight;
             score[i] += weight * away;
-            cost += weight * away * away;
+            cost += own_cost;
         }
         for (effect, range) in model.effects.iter().zip(model.ranges()) {
             let Some(own) = effect.nature().prior else { continue };
