@@ -241,7 +241,7 @@ fn columns(section: &Item) -> Result<Vec<ColumnMapping>, DatasetError> {
 fn mapping(columns: &Item, quantity: Quantity) -> Result<ColumnMapping, DatasetError> {
     let section = columns.need(quantity.name(), "a table")?;
     if !section.is_map() {
-        let unit = UNIT.assign(&format!("\"{}\"", Unit::base_of(quantity.dimension()).name()));
+        let unit = UNIT.assign(format!("\"{}\"", quantity.unit().name()));
         return Err(section.wrong_type(&keys::inline([of_any(COLUMN), unit])));
     }
     let is_time = quantity == Quantity::Time;

@@ -91,7 +91,7 @@ impl Search<'_> {
         is_better
     }
 
-    /// Drops effects that the others, or the noise that is left beside them, have made needless, unless one of the others would then have impossible parameters
+    /// Drops effects that the others, or the noise that remains with them, have made needless, unless one of the others would then have impossible parameters
     /// (winds that blow against every train instead of a tunnel's drag), and effects that have such parameters
     /// themselves.
     pub(super) fn prune(&self, outcome: &mut SearchOutcome) {

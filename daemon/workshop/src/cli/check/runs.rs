@@ -232,7 +232,7 @@ fn diagnostics_of(manifest: &Manifest, run: &Run) -> Vec<String> {
     diagnostics
 }
 
-/// Returns the diagnostics of a run by itself: a fault of the input is told of all runs that show it.
+/// Returns the diagnostics of a run by itself: a fault of the input stands for all runs that show it.
 fn own_diagnostics(run: &Run) -> impl Iterator<Item = &Diagnostic> {
     run.diagnostics.iter().filter(|diagnostic| diagnostic.fault.is_none())
 }

@@ -115,7 +115,7 @@ fn best_band(scan: &Scan, axis: BandAxis) -> Option<(f64, Candidate)> {
             sum.add(&cells.tuples[to]);
             let (gain, estimate) = scan.gain(&sum);
             seconds_s += cells.seconds[to];
-            // What acts everywhere is a resistance or a scale.
+            // A force that acts everywhere is a resistance or a scale.
             let is_part = to + 1 - from < count;
             if is_part && seconds_s > BAND_MIN_S && best.is_none_or(|best| gain > best.0) {
                 best = Some((gain, estimate, from, to + 1));

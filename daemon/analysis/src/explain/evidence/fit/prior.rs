@@ -88,7 +88,7 @@ impl Positions {
     }
 }
 
-/// Returns the cost of a declaration that is so many standard deviations off, and the weight by which its pull is less
+/// Returns the cost of a declaration by its error in standard deviations, and the weight by which its pull is less
 /// than that of a normal error: by Student's t distribution, whose middle is that of the normal one.
 fn declared_cost(deviations: f64) -> (f64, f64) {
     let count = DECLARED_FREEDOM + 1.0;
