@@ -63,7 +63,7 @@ pub enum RunError {
         source: std::io::Error,
     },
     /// The system gives no address to listen at.
-    #[error("metrics.listen = \"{address}\": {source}")]
+    #[error("metrics.listen = {address}: {source}")]
     Listen {
         /// The address of the configuration.
         address: SocketAddr,

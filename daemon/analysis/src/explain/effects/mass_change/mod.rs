@@ -160,6 +160,14 @@ fn all_windows(scan: &Scan) -> Vec<(FactorPart, Tuple)> {
     windows
 }
 
+/// Returns whether parts are most runs, each as a whole: those are all runs, or another effect.
+fn has_most_runs(scan: &Scan, parts: &[FactorPart]) -> bool {
+    let is_whole_run = |part: &&FactorPart| {
+        matches!(part.along, Along::Run(..)) && of_whole_runs(scan, part).is_some()
+    };
+    2 * parts.iter().filter(is_whole_run).count() > scan.problem.runs.len()
+}
+
 /// Adds parts one by one, each fitted with a factor of its own, while they explain something; where no end
 /// of it comes in sight on the line, all of them besides.
 fn grow(scan: &Scan, parts: &[(FactorPart, Tuple)]) -> Vec<Candidate> {
@@ -203,6 +211,9 @@ fn grow(scan: &Scan, parts: &[(FactorPart, Tuple)]) -> Vec<Candidate> {
             }
             _ => break,
         }
+    }
+    if has_most_runs(scan, masses.parts()) {
+        return Vec::new();
     }
     let is_everywhere = masses.parts().len() == PARTS_MAX
         && matches!(masses.parts(), [FactorPart { along: Along::Line(_), .. }, ..]);

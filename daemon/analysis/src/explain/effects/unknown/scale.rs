@@ -41,7 +41,8 @@ impl ControlScale {
     }
 
     /// Returns whether a force departs from every share of the control force by more than the least wrong scale, as
-    /// root mean squares.
+    /// root mean squares, or is for the most part no such share: of a force that acts at walking pace alone little is
+    /// left over all braking.
     pub fn is_left_by(&self, extra: &ExtraResistance) -> bool {
         let mut sums = [0.0; 3];
         for (sample, control) in &self.at {
@@ -52,7 +53,8 @@ impl ControlScale {
             }
         }
         let [own, both, control] = sums;
-        own - both * both / control > self.least.powi(2) * control
+        let left = own - both * both / control;
+        left > self.least.powi(2) * control || left > 0.5 * own
     }
 }
 
@@ -63,8 +65,8 @@ mod tests {
     use super::*;
     use crate::explain::evidence::coasting;
 
-    /// Whether 5 N/kN at 100 N and 1 kN of weight by a form of the brake force is more than a wrong scale.
-    fn is_left_by(form: Form, numbers: [f64; 2]) -> bool {
+    /// Whether a form of the brake force, up to 100 N on 1 kN of weight, is more than a wrong scale.
+    fn is_left_by(n_per_kn: f64, form: Form, numbers: [f64; 2]) -> bool {
         let braked = |k: i32| {
             let brake_n = f64::from(k);
             let sample =
@@ -73,15 +75,16 @@ mod tests {
         };
         let scale = ControlScale { least: 0.05, at: (1..=100).map(braked).collect() };
         let factors = vec![CovariateFactor { of: Covariate::BrakeForce, form, numbers }];
-        scale.is_left_by(&ExtraResistance { n_per_kn: 20.0, factors })
+        scale.is_left_by(&ExtraResistance { n_per_kn, factors })
     }
 
     #[test]
     fn a_power_near_one_is_a_wrong_scale_and_a_force_from_a_threshold_is_none() {
         for exponent in [0.9, 1.0, 1.1] {
-            assert!(!is_left_by(Form::Power, [100.0, exponent]), "{exponent}");
+            assert!(!is_left_by(20.0, Form::Power, [100.0, exponent]), "{exponent}");
         }
-        assert!(is_left_by(Form::Power, [100.0, 3.0]));
-        assert!(is_left_by(Form::Above, [60.0, 40.0]));
+        assert!(is_left_by(20.0, Form::Power, [100.0, 3.0]));
+        assert!(is_left_by(20.0, Form::Above, [60.0, 40.0]));
+        assert!(is_left_by(2.0, Form::Between, [10.0, 20.0]), "little of it, and no scale");
     }
 }
