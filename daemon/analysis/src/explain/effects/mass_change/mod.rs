@@ -5,7 +5,7 @@ mod masses;
 
 use std::sync::Arc;
 
-use dynocar_model::terms::masses::LEAST_SHARE;
+use dynocar_model::terms::masses::{LEAST_SHARE, WEIGHED_STD};
 
 use super::{Candidate, Certainty, Policy, Proposal};
 use crate::explain::evidence::{EQUAL, RunData};
@@ -77,7 +77,7 @@ fn part_tuple(scan: &Scan, part: &FactorPart) -> Tuple {
 
 /// Returns the decrease of the cost by another mass over whole runs, and its factor less 1, by the runs' own factors on
 /// the control force: these take such a mass up, and leave the scan hardly a trace of it. `None` of a part that begins
-/// or ends within a run.
+/// or ends within a run, and of a mass within three times the usual scatter of weighed loads.
 fn of_whole_runs(scan: &Scan, part: &FactorPart) -> Option<(f64, f64)> {
     let mut factors = Vec::new();
     for (index, run) in scan.problem.runs.iter().enumerate().filter(|(_, run)| part.is_in(run)) {
@@ -93,7 +93,8 @@ fn of_whole_runs(scan: &Scan, part: &FactorPart) -> Option<(f64, f64)> {
     let count = factors.len() as f64;
     let mean = factors.iter().sum::<f64>() / count;
     let deviations = mean / scan.fit.noise.scatter.force;
-    (count > 0.0).then(|| (count * deviations * deviations, -mean / (1.0 + mean)))
+    let is_beyond_scatter = mean.abs() > 3.0 * WEIGHED_STD;
+    is_beyond_scatter.then(|| (count * deviations * deviations, -mean / (1.0 + mean)))
 }
 
 /// Every row of neighbouring parts whose ends carry a force, with the sum of their tuples.
