@@ -3,13 +3,13 @@
 
 use std::cmp::Reverse;
 
+use dynocar_model::units::Unit;
+
 use super::columns::{InspectedColumn, InspectedColumns};
 use super::facts::Facts;
 use super::guessed::{GivenColumn, GuessedColumn, Unmapped};
 use super::matching::{UNKNOWN_UNIT, are_alike, can_hold, consider, figures};
 use super::name::named_unit;
-use dynocar_model::units::Unit;
-
 use crate::error::unknown;
 use crate::{DatasetError, Quantity, SourcePosition};
 

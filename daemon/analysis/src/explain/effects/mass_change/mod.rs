@@ -17,6 +17,8 @@ use masses::{Along, FactorPart, Masses, STATION_M, STOP_MIN_S, stations, stops};
 
 /// Greatest number of sections or windows.
 const PARTS_MAX: usize = 5;
+/// Own factor of a run, in standard deviations of weighed loads, beyond which it is another mass.
+const BEYOND_LOADS: f64 = 2.0;
 
 /// Loads differ from run to run, so that a change of mass is never certain.
 pub const POLICY: Policy =
@@ -75,10 +77,9 @@ fn part_tuple(scan: &Scan, part: &FactorPart) -> Tuple {
     sum
 }
 
-/// Returns the decrease of the cost by another mass over whole runs, and its factor less 1, by the runs' own factors on
-/// the control force: these take such a mass up, and leave the scan hardly a trace of it. `None` of a part that begins
-/// or ends within a run, and of a mass within three times the usual scatter of weighed loads.
-fn of_whole_runs(scan: &Scan, part: &FactorPart) -> Option<(f64, f64)> {
+/// Returns the own factors on the control force, less 1, of the runs in which a part holds from their beginning to their
+/// end; `None` of a part that begins or ends within a run.
+fn factors_of_whole_runs(scan: &Scan, part: &FactorPart) -> Option<Vec<f64>> {
     let mut factors = Vec::new();
     for (index, run) in scan.problem.runs.iter().enumerate().filter(|(_, run)| part.is_in(run)) {
         let mut held = run.bins.iter().map(|bin| part.holds(run, bin.middle()));
@@ -90,11 +91,18 @@ fn of_whole_runs(scan: &Scan, part: &FactorPart) -> Option<(f64, f64)> {
             factors.push(scan.fit.own_factors(index)[0]);
         }
     }
+    Some(factors)
+}
+
+/// Returns the decrease of the cost by another mass over whole runs, and its factor less 1, by the runs' own factors:
+/// these take such a mass up, and leave the scan hardly a trace of it. `None` where they are as weighed loads are.
+fn of_whole_runs(scan: &Scan, part: &FactorPart) -> Option<(f64, f64)> {
+    let factors = factors_of_whole_runs(scan, part)?;
     let count = factors.len() as f64;
     let mean = factors.iter().sum::<f64>() / count;
     let deviations = mean / scan.fit.noise.scatter.force;
-    let is_beyond_scatter = mean.abs() > 3.0 * WEIGHED_STD;
-    is_beyond_scatter.then(|| (count * deviations * deviations, -mean / (1.0 + mean)))
+    let is_beyond_loads = mean.abs() > BEYOND_LOADS * WEIGHED_STD;
+    is_beyond_loads.then(|| (count * deviations * deviations, -mean / (1.0 + mean)))
 }
 
 /// Every row of neighbouring parts whose ends carry a force, with the sum of their tuples.
@@ -164,7 +172,7 @@ fn all_windows(scan: &Scan) -> Vec<(FactorPart, Tuple)> {
 /// Returns whether parts are most runs, each as a whole: those are all runs, or another effect.
 fn has_most_runs(scan: &Scan, parts: &[FactorPart]) -> bool {
     let is_whole_run = |part: &&FactorPart| {
-        matches!(part.along, Along::Run(..)) && of_whole_runs(scan, part).is_some()
+        matches!(part.along, Along::Run(..)) && factors_of_whole_runs(scan, part).is_some()
     };
     2 * parts.iter().filter(is_whole_run).count() > scan.problem.runs.len()
 }

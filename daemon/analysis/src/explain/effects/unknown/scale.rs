@@ -6,6 +6,8 @@ use dynocar_model::terms::{brake, traction};
 
 use crate::explain::scan::Scan;
 
+/// Share of the square of a force above which most of it is no scale.
+const LEFT_SHARE: f64 = 0.5;
 /// Greatest number of samples that are compared.
 const COMPARED_MAX: usize = 1000;
 
@@ -54,7 +56,7 @@ impl ControlScale {
         }
         let [own, both, control] = sums;
         let left = own - both * both / control;
-        left > self.least.powi(2) * control || left > 0.5 * own
+        left > self.least.powi(2) * control || left > LEFT_SHARE * own
     }
 }
 
