@@ -292,7 +292,7 @@ impl Stop<'_> {
         require(is_not_negative(self.w0_std_n_per_kn), "w0_std_n_per_kn", self.w0_std_n_per_kn)?;
         require(self.gradient_permille.is_finite(), "gradient_permille", self.gradient_permille)?;
         require(is_positive(self.gravity_mps2), "gravity_mps2", self.gravity_mps2)?;
-        require(is_not_negative(self.brake_scale.value), "brake_scale", self.brake_scale.value)?;
+        require(is_positive(self.brake_scale.value), "brake_scale", self.brake_scale.value)?;
         require(is_not_negative(self.brake_scale.std), "brake_scale", self.brake_scale.std)?;
         let response = &self.response;
         let require_time =

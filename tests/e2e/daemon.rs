@@ -114,8 +114,8 @@ fn a_controller_of_another_schema_is_named_in_the_log() {
 fn a_wrong_configuration_is_refused_with_key_value_and_range() {
     let cases = [
         ("spin_us = 2000000", ECHO, "daemon.spin_us = 2000000: expected a whole number"),
-        ("spinn_us = 2", ECHO, "unknown field `spinn_us`"),
-        ("idle = \"lazy\"", ECHO, "unknown variant `lazy`"),
+        ("spinn_us = 2", ECHO, "unknown key 'spinn_us'; did you mean 'spin_us'?"),
+        ("idle = \"lazy\"", ECHO, "unknown value 'lazy' (choices: 'busy', "),
         (
             "",
             "[[pipelines]]\nkind = \"kalmann\"\n",
@@ -131,7 +131,7 @@ fn a_wrong_configuration_is_refused_with_key_value_and_range() {
             "[[pipelines]]\nkind = \"echo\"\ntrains = [7]\n",
             "expected the id of a [[trains]] table: 1",
         ),
-        ("", "[[pipelines]]\nkind = \"echo\"\nsettings = { gain = 1 }\n", "unknown field `gain`"),
+        ("", "[[pipelines]]\nkind = \"echo\"\nsettings = { gain = 1 }\n", "unknown key 'gain'"),
         ("", "", "pipelines = 0: expected 1 to 32"),
         (
             "",

@@ -102,7 +102,7 @@ fn a_train_that_declares_its_tare_and_its_full_load_is_told_of_no_changed_mass()
         let tare_kg = data.declared_train().mass_kg / 1.2;
         data.train.declared.mass_kg = tare_kg;
         for sample in data.runs.iter_mut().flat_map(|run| &mut run.samples) {
-            sample.set(SampleField::Mass, tare_kg);
+            sample.valid &= !SampleField::Mass.bit();
         }
         let named = [None, Some(1.4)].map(|full| {
             data.train.declared.full_mass_kg = full.map(|full: f64| full * tare_kg);

@@ -31,6 +31,9 @@ const EXCEPTION: f64 = 3.0;
 /// The speed in m/s from which a train surely moves.
 const MOVING_MPS: f64 = 1.0;
 
+/// Code of a force that no column gives.
+pub const FORCE_NOT_RECORDED: &str = "force_not_recorded";
+
 fn of(quantity: Quantity) -> (&'static str, Value) {
     ("quantity", quantity.name().into())
 }
@@ -377,8 +380,13 @@ fn of_force(
         diagnostics.push(Diagnostic::new("unused_handle", Info, text, [of(handle)]));
     }
     if force.source == ForceSource::None {
-        let text =
-            format!("no {quantity} is mapped: without it the balance of forces is not known");
-        diagnostics.push(Diagnostic::new("force_not_recorded", Info, text, [of(quantity)]));
+        let remedy = match quantity {
+            Quantity::BrakeForce => "; --traction-only uses the forces under traction alone",
+            _ => "",
+        };
+        let text = format!(
+            "no {quantity} is mapped: without it the balance of forces is not known{remedy}"
+        );
+        diagnostics.push(Diagnostic::new(FORCE_NOT_RECORDED, Info, text, [of(quantity)]));
     }
 }

@@ -1,7 +1,8 @@
 //! Faults of recorded forces that the motion, or the declared effort, contradicts.
 
 use dynocar_core::plausibility::Severity::{Fundamental, Warning};
-use dynocar_model::train::EffortCurve;
+use dynocar_model::train::{EffortCurve, TrainModel};
+use dynocar_shared::resistance::GRAVITY_MPS2;
 use toml::Value;
 
 use super::diagnostic::Diagnostic;
@@ -32,8 +33,8 @@ pub(super) fn force_faults(context: Context, run: &Resolved) -> Vec<Diagnostic> 
         always_zero(run, brake, (Quantity::BrakeForce, -1.0)),
     ];
     let efforts = [
-        beyond_effort(traction, Quantity::TractionForce, context.train.traction.as_ref()),
-        beyond_effort(brake, Quantity::BrakeForce, context.train.brake.as_ref()),
+        beyond_effort(traction, Quantity::TractionForce, context.train, |it| it.traction.as_ref()),
+        beyond_effort(brake, Quantity::BrakeForce, context.train, |it| it.brake.as_ref()),
     ];
     zeros.into_iter().chain(efforts).flatten().collect()
 }
@@ -82,13 +83,21 @@ fn always_zero(
 }
 
 /// Returns that a force exceeds the declared effort by far in some rows, as where a recorder writes a number in the
-/// place of a missing value.
+/// place of a missing value; without a declared effort, that it exceeds the train's weight.
 fn beyond_effort(
     force: &Force,
     quantity: Quantity,
-    effort: Option<&EffortCurve>,
+    train: &TrainModel,
+    effort: impl Fn(&TrainModel) -> Option<&EffortCurve>,
 ) -> Option<Diagnostic> {
-    let most_n = effort.map(EffortCurve::force_max_n).filter(|it| *it > 0.0)?;
+    let declared_n = effort(train).map(EffortCurve::force_max_n).filter(|it| *it > 0.0);
+    let (most_n, effort) = match declared_n {
+        Some(most_n) => (most_n, format!("the declared effort of {most_n:.0} N")),
+        None => {
+            let weight_n = train.mass_kg * GRAVITY_MPS2;
+            (weight_n / EFFORT_SHARE_MAX, format!("the train's weight of {weight_n:.0} N"))
+        }
+    };
     let rows = force.force_n.iter().zip(&force.is_spike).filter(|(_, is_spike)| !**is_spike);
     let is_beyond = |force_n: &f64| *force_n > EFFORT_SHARE_MAX * most_n;
     let beyond: Vec<f64> = rows.map(|row| *row.0).filter(is_beyond).collect();
@@ -99,8 +108,8 @@ fn beyond_effort(
         _ => format!("up to {greatest_n:.0} N"),
     };
     let text = format!(
-        "{quantity} exceeds the declared effort of {most_n:.0} N in {count} rows, {same}: is it a number in the \
-         place of a missing value, or is the effort or the unit wrong?"
+        "{quantity} exceeds {effort} in {count} rows, {same}: is it a number in the place of a missing value, or \
+         is the effort or the unit wrong?"
     );
     let figures = [
         ("quantity", quantity.name().into()),
@@ -170,5 +179,7 @@ mod tests {
     fn forces_far_beyond_the_declared_effort_are_counted() {
         let filled = |time_s: f64| if time_s % 5.0 < 0.95 { 655_350.0 } else { pulls(time_s) };
         assert_eq!(codes(filled, brakes), ["beyond_effort"]);
+        let filled = |time_s: f64| if time_s % 5.0 < 0.95 { 9_999e3 } else { brakes(time_s) };
+        assert_eq!(codes(pulls, filled), ["beyond_effort"], "the brake's effort is not declared");
     }
 }

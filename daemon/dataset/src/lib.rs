@@ -61,6 +61,7 @@ mod tests;
 
 pub use clock::TimeFormat;
 pub use dataset_diagnostic::DatasetDiagnostic;
+pub use diagnosing::FORCE_NOT_RECORDED;
 pub use diagnostic::{Diagnostic, unusual_resistance};
 pub use document::top_keys;
 pub use error::{DatasetError, FileProblem, SourcePosition};

@@ -11,6 +11,8 @@ use super::node::Node;
 
 /// Name of a train that nobody named.
 const UNNAMED: &str = "unnamed train";
+/// Full load over tare beyond which one of them is in another unit: a loaded hopper is four times its tare.
+const FULL_OVER_TARE_MAX: f64 = 8.0;
 
 /// Reads the text of a `train.toml`; `label` names the file in messages.
 ///
@@ -42,7 +44,7 @@ pub fn parse_train(label: &str, text: &str) -> Result<TrainModel, DatasetError> 
         model.name = name.into();
     }
     if let Some(full_kg) = model.full_mass_kg
-        && full_kg <= model.mass_kg
+        && !(full_kg > model.mass_kg && full_kg <= FULL_OVER_TARE_MAX * model.mass_kg)
     {
         let key = FileKey::from(&FULL_MASS);
         return Err(key.refused(&train, full_kg / key.rule.factor));

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use dynocar_dataset::{DatasetDiagnostic, SourcePosition, top_keys};
+use dynocar_dataset::{DatasetDiagnostic, top_keys};
 use dynocar_shared::Quantity;
 use serde::Serialize;
 
@@ -76,7 +76,7 @@ pub fn execute(arguments: &CheckArguments) -> Result<(), Failure> {
     if !is_ours || arguments.draw.is_some() {
         return become_it(WORKSHOP, Some("check"), &words_of_command());
     }
-    let config = or_refused(path, json, read(path))?;
+    let config = or_refused(path, json, DaemonConfig::load(path).map_err(Failure::from))?;
     give(json, &understood(path, &config), || report(&config))?;
     Ok(())
 }
@@ -134,26 +134,6 @@ fn may_be_configuration(path: &Path) -> Result<bool, Failure> {
     }
     let (label, text) = labelled_text(path)?;
     Ok(kind_of(&top_keys(&label, &text)?) == Some(FileKind::Daemon))
-}
-
-/// Reads a configuration with the train and track files that it names, and builds every estimator, so that a setting
-/// out of range is found here and not when the daemon starts.
-///
-/// # Errors
-///
-/// The first mistake.
-pub fn read(path: &Path) -> Result<DaemonConfig, Failure> {
-    let config = DaemonConfig::load(path)?;
-    for pipeline in &config.pipelines {
-        for train in config.trains.iter().filter(|train| pipeline.trains.contains(&train.id)) {
-            pipeline.estimator.build(&train.model).map_err(|error| {
-                let label = path.display().to_string();
-                let words = format!("{label}: pipelines.{}.settings.{error}", pipeline.name);
-                Failure::At(SourcePosition::whole(&label), words)
-            })?;
-        }
-    }
-    Ok(config)
 }
 
 /// Returns the configuration in words and columns.

@@ -124,9 +124,10 @@ impl From<ConfigError> for Failure {
         match error {
             ConfigError::Model(error) => error.into(),
             ConfigError::Root(_) => Failure::Input(message),
-            ConfigError::Unreadable { path, .. }
-            | ConfigError::Malformed { path, .. }
-            | ConfigError::OutOfRange { path, .. } => Failure::at(&path, message),
+            ConfigError::Unreadable { path, .. } => Failure::at(&path, message),
+            ConfigError::Malformed { place, .. } | ConfigError::OutOfRange { place, .. } => {
+                Failure::At(place, message)
+            }
         }
     }
 }

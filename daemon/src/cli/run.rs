@@ -39,7 +39,6 @@ pub fn execute(arguments: &RunArguments) -> Result<(), Failure> {
         RunError::Root(RootError::OfEnvironment(ChannelError::RootLength { .. })) => {
             Failure::input(error)
         }
-        RunError::Setting(_) => Failure::Input(format!("{}: {error}", arguments.config.display())),
         error => Failure::work(error),
     })
 }

@@ -2,7 +2,8 @@
 
 use dynocar_shared::PipelineKind;
 
-use super::{Checker, ConfigError, PipelineConfig, ThreadConfig};
+use super::refusals::{Checker, ConfigError};
+use super::{PipelineConfig, ThreadConfig};
 
 /// The name of a thread that is proposed for slow pipelines.
 const SLOW: &str = "slow";

@@ -5,6 +5,7 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use dynocar_core::pipeline::SettingError;
 use dynocar_dataset::dataset_diagnostic::diagnostics;
 use dynocar_dataset::{DatasetDiagnostic, keys};
 use dynocar_estimators::EstimatorSettings;
@@ -14,10 +15,11 @@ use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::{PipelineKind, TrainId};
 
 use super::quantities::Answers;
+use super::refusals::{Checker, ConfigError};
 use super::{
-    Checker, ConfigError, IdleStrategy, ModelsConfig, PipelineConfig, ProcessConfig, RawConfig,
-    RawMetrics, RawModels, RawPipeline, RawQuantities, RawThread, RawTrain, StateConfig,
-    ThreadConfig, USUAL_INTERVAL_S, apart,
+    IdleStrategy, ModelsConfig, PipelineConfig, ProcessConfig, RawConfig, RawMetrics, RawModels,
+    RawPipeline, RawQuantities, RawThread, RawTrain, StateConfig, ThreadConfig, USUAL_INTERVAL_S,
+    apart,
 };
 use crate::dataset::{LoadError, read_text};
 use crate::models::{ModelHash, ModelText};
@@ -105,18 +107,14 @@ const THREADS_MAX: usize = 10;
 
 /// Checks a configuration's text; `path` is the file it came from.
 pub fn check(path: &Path, text: &str) -> Result<DaemonConfig, ConfigError> {
-    let raw: RawConfig = toml::from_str(text).map_err(|error| ConfigError::Malformed {
-        path: path.into(),
-        message: error.to_string().trim_end().to_owned(),
-    })?;
-    let checker = Checker { path };
+    let checker = Checker { path, text };
+    let raw: RawConfig = toml::from_str(text).map_err(|error| checker.malformed("", &error))?;
     let (mut trains, named): (Vec<_>, Vec<_>) =
         check_trains(&checker, raw.trains)?.into_iter().unzip();
     let process = ProcessConfig { file: path.into(), ..raw.daemon };
     process.check_root()?;
     if process.log_filter().is_none() {
-        let allowed =
-            "off, error, warn, info, debug or trace, or these by module, as dynocar=debug";
+        let allowed = "a level from off to trace, or levels by module, as dynocar=debug";
         return checker.refuse("daemon.log", format!("{:?}", process.log), allowed);
     }
     let mut threads = check_threads(&checker, raw.threads, process.idle)?;
@@ -138,8 +136,8 @@ pub fn check(path: &Path, text: &str) -> Result<DaemonConfig, ConfigError> {
         return checker.refuse("trains.candidates", "models", "a store of models, [models]");
     }
     if models.is_some() && threads.len() == THREADS_MAX {
-        let allowed =
-            format!("at most {} threads beside the one that tries models", THREADS_MAX - 1);
+        let most = THREADS_MAX - 1;
+        let allowed = format!("at most {most} threads beside the one that tries models");
         return checker.refuse("threads", threads.len(), allowed);
     }
     checker.range("daemon.spin_us", process.spin_us, 0, 1_000_000)?;
@@ -266,8 +264,10 @@ fn check_pipelines(
             if !names.insert(name.clone()) {
                 return checker.refuse("pipelines.name", name, "a name that no other pipeline has");
             }
-            let estimator = check_estimator(checker, &name, &pipeline.kind, pipeline.settings)?;
-            let trains = check_pipeline_trains(checker, &name, pipeline.trains, trains)?;
+            let own = check_pipeline_trains(checker, &name, pipeline.trains, trains)?;
+            let served = trains.iter().filter(|it| own.contains(&it.id));
+            let RawPipeline { kind, settings, .. } = pipeline;
+            let estimator = check_estimator(checker, &name, &kind, settings, served)?;
             let thread = match pipeline.thread {
                 None => {
                     let name = name.clone();
@@ -285,16 +285,18 @@ fn check_pipelines(
                     }
                 }
             };
-            Ok(PipelineConfig { name, estimator, thread, trains })
+            Ok(PipelineConfig { name, estimator, thread, trains: own })
         })
         .collect()
 }
 
-fn check_estimator(
+/// Checks an estimator's kind and its settings, with each train that it is to serve.
+fn check_estimator<'t>(
     checker: &Checker,
     name: &str,
     kind: &str,
     mut settings: toml::Table,
+    mut trains: impl Iterator<Item = &'t TrainConfig>,
 ) -> Result<EstimatorSettings, ConfigError> {
     let known = PipelineKind::from_name(kind).and_then(EstimatorSettings::default_of);
     if known.is_none() {
@@ -307,9 +309,12 @@ fn check_estimator(
         return checker.refuse(format!("pipelines.{name}.kind"), kind, allowed);
     }
     settings.insert("kind".into(), toml::Value::String(kind.into()));
-    settings.try_into().map_err(|error: toml::de::Error| ConfigError::Malformed {
-        path: checker.path.into(),
-        message: format!("pipelines.{name}.settings: {}", error.message()),
+    let table = format!("pipelines.{name}.settings");
+    let estimator: EstimatorSettings =
+        settings.try_into().map_err(|error| checker.malformed(&table, &error))?;
+    let refused = trains.find_map(|train| estimator.build(&train.model).err());
+    refused.map_or(Ok(estimator), |SettingError { key, value, allowed }| {
+        checker.refuse(format!("{table}.{key}"), value, allowed)
     })
 }
 

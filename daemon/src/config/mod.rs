@@ -5,8 +5,9 @@
 //!
 //! # Layout
 //!
-//! - here: the parts of a configuration, as checked and as the text has them; refusals; a pipeline from its settings
+//! - here: the parts of a configuration, as checked and as the text has them; a pipeline from its settings
 //! - `check`: from the text to a [`DaemonConfig`]
+//! - `refusals`: why a configuration is refused, and at which line
 //! - `places`: the directories that it names
 //! - `quantities`: the pipeline that answers each of a controller's questions
 //! - `apart`: a thread of their own for slow pipelines
@@ -15,18 +16,18 @@ mod apart;
 mod check;
 mod places;
 mod quantities;
+mod refusals;
 
 pub use apart::is_slow;
 pub use check::{DaemonConfig, TrainConfig};
-pub use places::RootError;
 pub use quantities::Answers;
+pub use refusals::{ConfigError, RootError};
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use dynocar_core::pipeline::{Pipeline, SettingError};
-use dynocar_dataset::FileProblem;
 use dynocar_estimators::EstimatorSettings;
 use dynocar_model::named;
 use dynocar_shared::TrainId;
@@ -34,78 +35,6 @@ use serde::Deserialize;
 use tracing_subscriber::filter::{LevelFilter, Targets};
 
 use crate::shadow::rule::{Adopt, Rule};
-
-/// Why a configuration is refused.
-#[derive(Debug, thiserror::Error)]
-pub enum ConfigError {
-    /// The file's text cannot be read.
-    #[error("{path}: {problem}")]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// Why not.
-        problem: FileProblem,
-    },
-    /// The file is no TOML, or has a key or type that is not expected.
-    #[error("{path}: {message}")]
-    Malformed {
-        /// The file.
-        path: PathBuf,
-        /// Message of the reader, with the line.
-        message: String,
-    },
-    /// A value lies outside its range.
-    #[error("{path}: {key} = {value}: expected {allowed}")]
-    OutOfRange {
-        /// The file.
-        path: PathBuf,
-        /// The key, with its table.
-        key: String,
-        /// The value it was given.
-        value: String,
-        /// The allowed range, in words.
-        allowed: String,
-    },
-    /// A train or track file is wrong; the message names it.
-    #[error(transparent)]
-    Model(#[from] crate::dataset::LoadError),
-    /// The run-time directory cannot be one.
-    #[error(transparent)]
-    Root(#[from] RootError),
-}
-
-/// Names the configuration's file in every refusal.
-pub(super) struct Checker<'a> {
-    pub path: &'a Path,
-}
-
-impl Checker<'_> {
-    /// Returns the folder to which file names in the configuration are relative.
-    pub fn folder(&self) -> &Path {
-        self.path.parent().unwrap_or(Path::new("."))
-    }
-
-    pub fn refuse<T>(
-        &self,
-        key: impl Into<String>,
-        value: impl ToString,
-        allowed: impl Into<String>,
-    ) -> Result<T, ConfigError> {
-        Err(ConfigError::OutOfRange {
-            path: self.path.into(),
-            key: key.into(),
-            value: value.to_string(),
-            allowed: allowed.into(),
-        })
-    }
-
-    pub fn range(&self, key: &str, value: u64, low: u64, high: u64) -> Result<u64, ConfigError> {
-        if (low..=high).contains(&value) {
-            return Ok(value);
-        }
-        self.refuse(key, value, format!("a whole number from {low} to {high}"))
-    }
-}
 
 named! {
     /// Behaviour of a pipeline thread while no sample comes.
@@ -361,9 +290,44 @@ pub fn build_pipeline(
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use tracing::Level;
 
     use super::*;
+
+    #[test]
+    fn a_mistyped_key_is_named_with_its_line_and_its_likely_meaning() {
+        let refused = |text: &str| {
+            DaemonConfig::from_text(Path::new("d.toml"), text).unwrap_err().to_string()
+        };
+        let train = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/demo/train.toml");
+        let trains = format!("[[trains]]\nid = 1\nfile = {train:?}\n[[pipelines]]\n");
+        let refusals = [
+            ("nam = 1", "d.toml:5: unknown key 'nam'; did you mean 'name'? (choices: 'name', "),
+            ("kind = 1", "d.toml:5: invalid type: integer "),
+            (
+                "kind = \"train_kalman\"\nsettings = { brake_lag = 1.0 }",
+                "d.toml:6: pipelines.train_kalman.settings: unknown key 'brake_lag'; did you mean 'brake_lag_s'?",
+            ),
+            (
+                "kind = \"train_kalman\"\nsettings = { brake_lag_s = -5.0 }",
+                "d.toml:6: pipelines.train_kalman.settings.brake_lag_s = -5: expected 0.01 to 60 s",
+            ),
+            (
+                "kind = \"train_kalmann\"",
+                "d.toml:5: pipelines.train_kalmann.kind = train_kalmann: ",
+            ),
+        ];
+        for (pipeline, words) in refusals {
+            let refusal = refused(&format!("{trains}{pipeline}\n"));
+            assert!(refusal.starts_with(words), "{refusal}");
+        }
+        assert_eq!(
+            refused("[daemon]\nidle = \"bussy\"\n"),
+            "d.toml:2: unknown value 'bussy'; did you mean 'busy'? (choices: 'busy', 'adaptive', 'event')"
+        );
+    }
 
     #[test]
     fn a_log_is_a_level_or_levels_by_module_and_nothing_else() {

@@ -4,23 +4,8 @@ use std::path::{Path, PathBuf, absolute};
 
 use dynocar_transport::{ChannelError, Host};
 
-use super::{Checker, ConfigError, DaemonConfig, ProcessConfig};
-
-/// Why the run-time directory cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum RootError {
-    /// That of the environment.
-    #[error(transparent)]
-    OfEnvironment(ChannelError),
-    /// That of a configuration.
-    #[error("{file}: daemon.root, in place of DYNOCAR_ROOT: {source}")]
-    Configured {
-        /// The configuration's file.
-        file: PathBuf,
-        /// Why not.
-        source: ChannelError,
-    },
-}
+use super::refusals::{Checker, ConfigError, RootError};
+use super::{DaemonConfig, ProcessConfig};
 
 impl ProcessConfig {
     /// Returns the host under the run-time directory.

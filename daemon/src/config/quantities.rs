@@ -4,7 +4,8 @@ use dynocar_core::pipeline::output::candidates;
 use dynocar_dataset::error::unknown;
 use dynocar_shared::{Quantity, TrainId};
 
-use super::{Checker, ConfigError, PipelineConfig, RawQuantities};
+use super::refusals::{Checker, ConfigError};
+use super::{PipelineConfig, RawQuantities};
 
 /// The pipelines that answer a train's controller, each by its number in the configuration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -33,7 +34,8 @@ impl Answers {
             if let Some(name) = named.keys().find(is_unknown) {
                 let names = Quantity::ALL.iter().map(|it| it.name());
                 let message = unknown("quantity", name, &format!(" in [{table}]"), names);
-                return Err(ConfigError::Malformed { path: checker.path.into(), message });
+                let place = checker.place(&format!("{table}.{name}"), "");
+                return Err(ConfigError::Malformed { place, message });
             }
         }
         let mut answers = Answers::default();

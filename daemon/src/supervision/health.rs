@@ -317,7 +317,7 @@ mod tests {
         };
         let words = waiting.in_words();
         assert!(
-            words.ends_with("; adhesion learning (only_lower_bound): driving ends it"),
+            words.ends_with("; adhesion learning (only_lower_bound): wheels that slide end it"),
             "{words}"
         );
     }

@@ -63,6 +63,18 @@ pub fn moment(time_s: f64) -> Option<UtcSecond> {
     OF_EPOCH_S.contains(&time_s).then_some(UtcSecond { unix_s: time_s as u64 })
 }
 
+/// Returns the second from which a run's times are counted on an axis, and its time in s in the recording: that of the
+/// first value where times count from 1970, else that of the first row where day and hour are known.
+pub fn beginning(first_s: f64, run: Option<&Run>) -> Option<(UtcSecond, f64)> {
+    let of_times = moment(first_s).map(|it| (it, first_s.floor()));
+    of_times.or_else(|| {
+        let run = run?;
+        // A day alone is its midnight.
+        let at = recorded(run).filter(|it| it.unix_s % 86_400 != 0)?;
+        Some((at, run.quality.start_s))
+    })
+}
+
 /// Notes on a dataset, each from a line of its own; those by which it cannot be true say so.
 pub fn diagnostics(diagnostics: &[DatasetDiagnostic]) -> String {
     let line = |it: &DatasetDiagnostic| format!("{}\n", wrap(&it.labelled(), WIDTH).join("\n  "));

@@ -46,6 +46,7 @@ impl UseState {
         match (self, reason) {
             (UseState::Usable, _) => "half a second of doubt ends it",
             (UseState::Learning, Some(reason)) if reason.is_of_input() => "it ends with its reason",
+            (UseState::Learning, Some(Reason::OnlyLowerBound)) => "wheels that slide end it",
             (UseState::Learning, _) => "driving ends it",
             (UseState::Confirming, _) => {
                 "2 s without doubt end it, after a doubt 5 s, after each further one twice as long, up to 10 min"
@@ -64,7 +65,8 @@ mod tests {
     fn no_driving_ends_what_the_samples_lack() {
         for &reason in Reason::ALL {
             let is_by_driving = UseState::Learning.ends(Some(reason)) == "driving ends it";
-            assert_eq!(is_by_driving, !reason.is_of_input(), "{reason}");
+            let is_by_sliding = reason == Reason::OnlyLowerBound;
+            assert_eq!(is_by_driving, !reason.is_of_input() && !is_by_sliding, "{reason}");
         }
         assert!(Reason::BadInput.is_of_input() && !Reason::TooFewSamples.is_of_input());
     }

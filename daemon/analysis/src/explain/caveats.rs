@@ -59,6 +59,13 @@ pub fn caveats(
     caveats.extend(effects.iter().filter_map(by_held_out_runs));
     caveats.extend([worse_held_out(effects, score), small_effects(outcome, effects)]);
     caveats.push(undetermined(search.problem, &outcome.fit, &known.deviations.std));
+    if search.problem.runs.iter().any(|run| run.are_loads_estimated) {
+        caveats.push(
+            " No sample weighs the load: after each stop it is what the traction force moves, so that a wrong scale \
+             of that force would show as another load, and as a wrong brake."
+                .into(),
+        );
+    }
     caveats.extend(not_held(identifiability));
     caveats
 }

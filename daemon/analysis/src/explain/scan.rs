@@ -128,6 +128,19 @@ impl<'a> Scan<'a> {
             && self.requires_force(|sample| sample.brake_force_n, "braking").is_err()
     }
 
+    /// Returns whether loads are taken from the traction force, which then shows neither a wrong scale of itself nor
+    /// another mass.
+    ///
+    /// # Errors
+    ///
+    /// Where they are, in words.
+    pub fn requires_known_loads(&self) -> Result<(), String> {
+        match self.problem.runs.iter().any(|run| run.are_loads_estimated) {
+            true => Err("no sample weighs the load, which is taken from the traction force".into()),
+            false => Ok(()),
+        }
+    }
+
     /// Returns the tuple of a force shape over all runs: `acceleration(run, sample)` in m/s² per unit.
     pub fn tuple(&self, acceleration: impl Fn(&RunData, usize) -> f64 + Sync) -> Tuple {
         self.over_each_run(1, |index, _| self.run_tuple(index, &acceleration))

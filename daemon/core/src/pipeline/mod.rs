@@ -57,7 +57,10 @@ impl Pipeline {
         snapshot.train_id = train_id.0;
         snapshot.pipeline_index = index;
         snapshot.pipeline_kind = estimator.kind() as u32;
-        let admission = Admission::new(train_id, Arc::clone(&train));
+        let mut admission = Admission::new(train_id, Arc::clone(&train));
+        if let Some(line_m) = track.as_ref().and_then(|track| track.length_m) {
+            admission.keep_on_line(line_m, train.length_m);
+        }
         admission.write(&*estimator, &mut snapshot);
         let answerable = output::answerable(estimator.kind());
         Pipeline {

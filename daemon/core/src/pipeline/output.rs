@@ -68,11 +68,14 @@ impl Switch {
 pub struct Usable {
     switches: [Switch; Quantity::ALL.len()],
     last_ns: Option<i64>,
+    /// Time in s between the newest two samples whose times grew; a sample whose time does not grow counts as much, so
+    /// that a clock that stands still leaves nothing usable.
+    step_s: f64,
 }
 
 impl Default for Usable {
     fn default() -> Self {
-        Usable { switches: [Switch::OFF; Quantity::ALL.len()], last_ns: None }
+        Usable { switches: [Switch::OFF; Quantity::ALL.len()], last_ns: None, step_s: 0.0 }
     }
 }
 
@@ -96,10 +99,13 @@ impl Usable {
     /// Bounded work, no allocation.
     pub fn see(&mut self, good: u32, is_awaiting: bool, time_ns: i64) -> u32 {
         let before_ns = self.last_ns.replace(time_ns).unwrap_or(time_ns);
-        let step_s = (time_ns.saturating_sub(before_ns) as f64 * 1e-9).clamp(0.0, BRIDGED_MAX_S);
+        if time_ns > before_ns {
+            let step_s = time_ns.saturating_sub(before_ns) as f64 * 1e-9;
+            self.step_s = step_s.min(BRIDGED_MAX_S);
+        }
         let mut usable = 0;
         for (switch, quantity) in self.switches.iter_mut().zip(Quantity::ALL) {
-            switch.see(good & quantity.bit() != 0, is_awaiting, step_s);
+            switch.see(good & quantity.bit() != 0, is_awaiting, self.step_s);
             usable |= u32::from(switch.is_usable) * quantity.bit();
         }
         usable
@@ -232,6 +238,16 @@ mod tests {
         assert_eq!(changes(3, |_| true), (1, MASS));
         assert_eq!(changes(10, |tick| tick < 96), (1, MASS), "less than half a second of doubt");
         assert_eq!(changes(10, |tick| tick < 90), (2, 0));
+    }
+
+    #[test]
+    fn a_clock_that_stands_still_leaves_nothing_usable() {
+        let mut usable = Usable::default();
+        for tick in 0..100 {
+            usable.see(MASS, false, tick * 100_000_000);
+        }
+        let stuck: Vec<u32> = (0..10).map(|_| usable.see(0, false, 9_900_000_000)).collect();
+        assert_eq!((stuck[0], stuck[9]), (MASS, 0));
     }
 
     #[test]

@@ -9,6 +9,11 @@ use serde::Serialize;
 
 /// A unit is named when its factor differs from the factor found by no more than this share.
 const UNIT_TOLERANCE: f64 = 0.2;
+/// Forces that are wrong by no more than this factor may as well be right and the mass wrong, as that of one car is.
+const MASS_FACTOR_MAX: f64 = 8.0;
+
+/// Recorded over true speed below which the speed stands at 0: of two units of time one is 1e-9 of the other at most.
+pub(super) const STUCK_FACTOR: f64 = 1e-10;
 
 /// How much a note matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -158,6 +163,11 @@ impl DetectedFault {
         let size = size(low, high);
         let what = match self.fault {
             InputFault::TimeScale => format!("times look {size} by speed, position and forces"),
+            InputFault::SpeedScale if high < STUCK_FACTOR => {
+                return "the speed stays near 0 while the position runs on: is its sensor or column \
+                        right?"
+                    .into();
+            }
             InputFault::SpeedScale => {
                 format!("speeds look {size} by position or acceleration")
             }
@@ -197,12 +207,14 @@ impl DetectedFault {
                 format!("the brake-cylinder pressure looks {size} for a brake that is applied")
             }
         };
-        match self.true_unit(read_as) {
-            Some(unit) => {
-                format!("{what}: is the unit {} and not {}?", unit.name(), read_as.name())
-            }
-            None => format!("{what}: is the unit {} right?", read_as.name()),
-        }
+        let question = match self.true_unit(read_as) {
+            Some(unit) => format!("is the unit {} and not {}", unit.name(), read_as.name()),
+            None => format!("is the unit {} right", read_as.name()),
+        };
+        let may_be_mass =
+            self.fault == InputFault::ForcesScale && self.factor.ln().abs() < MASS_FACTOR_MAX.ln();
+        let or_mass = if may_be_mass { ", or the mass wrong" } else { "" };
+        format!("{what}: {question}{or_mass}?")
     }
 }
 
@@ -260,5 +272,12 @@ mod tests {
         assert_eq!(unit(InputFault::SpeedScale, 3.6, "m/s"), Some("km/h"));
         assert_eq!(unit(InputFault::GradientScale, 0.1, "permille"), Some("%"));
         assert_eq!(unit(InputFault::ForcesScale, 50.0, "N"), None);
+        let fault = DetectedFault { fault: InputFault::ForcesScale, factor: 0.25 };
+        let newtons = Unit::find(Dimension::Force, "N").unwrap();
+        assert_eq!(
+            fault.words(&newtons),
+            "forces look 4.0 times too small for how the train accelerates: is the unit lbf and not N, \
+             or the mass wrong?"
+        );
     }
 }

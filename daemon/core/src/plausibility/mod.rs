@@ -23,17 +23,19 @@ pub mod input_fault;
 pub(crate) mod watch;
 pub mod window_balance;
 
+use input_fault::STUCK_FACTOR;
 pub use input_fault::{DetectedFault, InputFault, Severity};
 
 use arrayvec::ArrayVec;
+use dynocar_model::terms::masses;
 use dynocar_shared::resistance::GRAVITY_MPS2;
 
 use crate::pipeline::admission::limits::MASS;
 use watch::Figures;
 use window_balance::{FittedFactor, WindowBalance};
 
-/// Factors of forces within these bounds are effects that a train can have.
-const FORCE_FACTORS: (f64, f64) = (0.4, 2.5);
+/// Factors of forces within these bounds are effects that a train can have, as is another mass.
+const FORCE_FACTORS: (f64, f64) = (masses::PARAMETER.lower, masses::PARAMETER.upper);
 /// Distance by position over distance by speed within these bounds is wear, gaps and drift.
 const DISTANCE_RATIOS: (f64, f64) = (0.8, 1.25);
 /// Factors of traction and brake that differ by less are one factor.
@@ -84,6 +86,13 @@ pub type DetectedFaults = ArrayVec<DetectedFault, DETECTED_MAX>;
 pub fn diagnose(figures: &Figures) -> DetectedFaults {
     let mut found = DetectedFaults::default();
     let kinematic = kinematic(figures);
+    if let Some(DetectedFault { fault: InputFault::SpeedScale, factor }) = kinematic
+        && factor < STUCK_FACTOR
+    {
+        // Nothing can be said of forces and gradients without a speed.
+        add(&mut found, InputFault::SpeedScale, factor);
+        return found;
+    }
     let (forces_by, gradients_by) = match kinematic {
         Some(DetectedFault { fault: InputFault::SpeedScale, factor }) => (factor, factor),
         Some(DetectedFault { fault: InputFault::TimeScale, factor }) => {
@@ -99,7 +108,7 @@ pub fn diagnose(figures: &Figures) -> DetectedFaults {
         add(&mut found, InputFault::MassScale, ratio);
         forces_by *= ratio;
     }
-    of_forces(figures, forces_by, kinematic.is_some(), &mut found);
+    of_forces(figures, forces_by, &mut found);
     if kinematic.is_none() {
         of_gradient(figures, gradients_by, &mut found);
     }
@@ -120,6 +129,10 @@ fn kinematic(figures: &Figures) -> Option<DetectedFault> {
     let ratio = figures.distance_ratio?;
     if (-DISTANCE_RATIOS.1..-DISTANCE_RATIOS.0).contains(&ratio) {
         return Some(DetectedFault { fault: InputFault::DirectionReversed, factor: ratio });
+    }
+    let factor = 1.0 / ratio.abs();
+    if factor < STUCK_FACTOR {
+        return Some(DetectedFault { fault: InputFault::SpeedScale, factor });
     }
     if !(ratio > 0.0) || !is_outside(ratio, DISTANCE_RATIOS) {
         return None;
@@ -164,13 +177,13 @@ fn common_factor(figures: &Figures) -> Option<f64> {
     }
 }
 
-fn of_forces(figures: &Figures, by: f64, is_kinematic: bool, found: &mut DetectedFaults) {
+fn of_forces(figures: &Figures, by: f64, found: &mut DetectedFaults) {
     let slopes = figures.slopes;
     if let Some(common) = common_factor(figures).map(|factor| factor / by) {
         if common < -FORCE_FACTORS.0 {
             add(found, InputFault::ForcesSwapped, common);
         } else if is_outside(common, FORCE_FACTORS) {
-            let (fault, factor) = blamed(figures, common, is_kinematic);
+            let (fault, factor) = blamed(figures, common);
             add(found, fault, factor);
         }
         return;
@@ -187,11 +200,12 @@ fn of_forces(figures: &Figures, by: f64, is_kinematic: bool, found: &mut Detecte
 }
 
 /// Returns who is to blame when both forces miss the acceleration by a factor: the speed where its units
-/// explain it and no position contradicts, the mass where the forces are such as the effort curves
+/// explain it and no position was recorded with which it would go together or not, the mass where the forces are such as the effort curves
 /// allow and would not be otherwise, else the forces.
-fn blamed(figures: &Figures, common: f64, is_kinematic: bool) -> (InputFault, f64) {
+fn blamed(figures: &Figures, common: f64) -> (InputFault, f64) {
     let of_forces = InputFault::ForcesScale.misfit(common).unwrap_or(f64::INFINITY);
-    let of_speed = InputFault::SpeedScale.misfit(common).filter(|_| !is_kinematic);
+    let has_position = figures.distance_ratio.is_some();
+    let of_speed = InputFault::SpeedScale.misfit(common).filter(|_| !has_position);
     if of_speed.is_some_and(|misfit| misfit < of_forces) {
         return (InputFault::SpeedScale, common);
     }
@@ -276,5 +290,34 @@ impl Severity {
             Severity::Fundamental => "cannot be true",
             Severity::Info | Severity::Warning => "note",
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::window_balance::Slopes;
+    use super::*;
+
+    fn found(figures: Figures) -> Vec<(InputFault, String)> {
+        let words = |it: &DetectedFault| (it.fault, it.to_string());
+        diagnose(&Figures { step_s: 0.1, ..figures }).iter().map(words).collect()
+    }
+
+    #[test]
+    fn a_speed_that_stays_at_zero_is_named_and_nothing_else() {
+        let slopes = Slopes { traction: Some(0.0), brake: Some(0.0), ..Slopes::default() };
+        let stuck = Figures { distance_ratio: Some(f64::INFINITY), slopes, ..Figures::default() };
+        let [(InputFault::SpeedScale, words)] = &found(stuck)[..] else { panic!("one fault") };
+        assert!(words.starts_with("the speed stays near 0 while the position runs on"), "{words}");
+    }
+
+    #[test]
+    fn a_speed_with_which_the_position_agrees_has_the_right_unit() {
+        let slopes = Slopes { traction: Some(3.6), brake: Some(3.6), ..Slopes::default() };
+        let alone = Figures { slopes, ..Figures::default() };
+        assert_eq!(found(alone)[0].0, InputFault::SpeedScale);
+        let agreed = Figures { distance_ratio: Some(1.0), ..alone };
+        let [(InputFault::ForcesScale, words)] = &found(agreed)[..] else { panic!("one fault") };
+        assert!(words.ends_with("or the mass wrong?"), "{words}");
     }
 }

@@ -95,7 +95,19 @@ impl InspectedColumns {
 fn unusable(name: &Name, files: &[RecordingText], layouts: &[GuessedLayout]) -> Option<String> {
     files.iter().zip(layouts).find_map(|(file, layout)| {
         match layout.header.iter().filter(|other| *other == name).count() {
-            0 => Some(format!("{} has no such column", file.label)),
+            0 => {
+                let alike = layout.header.iter().find(|other| other.words == name.words);
+                let units = alike.and_then(|it| it.unit.as_ref().zip(name.unit.as_ref()));
+                Some(units.map_or_else(
+                    || format!("{} has no such column", file.label),
+                    |(own, unit)| {
+                        let label = file.label;
+                        format!(
+                            "{label} has it in {own}, not in {unit}: write one unit in all files"
+                        )
+                    },
+                ))
+            }
             1 => None,
             count => Some(format!("its name occurs {count} times in {}{RENAME}", file.label)),
         }

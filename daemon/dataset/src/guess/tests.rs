@@ -269,6 +269,14 @@ fn a_column_that_another_file_lacks_or_fills_with_words_is_left_out() {
     let reason = &of(&three).unmapped[0].reason;
     assert!(reason.contains("it holds text in b.csv, line 102: 'many'"), "{reason}");
     assert!(of(&two).column(Speed).is_some());
+    let unit = |unit: &str| one.replacen("pax", &format!("force [{unit}]"), 1);
+    let files = [("a.csv", unit("kN")), ("b.csv", unit("N"))];
+    let files = files.each_ref().map(|(label, text)| RecordingText { label, text });
+    let guess = guess(&files, &[], GivenMarks::default()).unwrap();
+    assert_eq!(
+        guess.unmapped[0].reason,
+        "b.csv has it in N, not in kN: write one unit in all files"
+    );
 }
 
 #[test]

@@ -121,6 +121,17 @@ impl ResolvedSample {
         Some(self.gradient_permille? + self.extra_n_per_kn)
     }
 
+    /// Returns the sample of the same train with another load: a mass in kg, the rotating part in proportion.
+    pub fn with_mass(self, mass_kg: f64) -> Self {
+        let share = mass_kg / self.mass_kg;
+        ResolvedSample {
+            mass_kg,
+            inertial_mass_kg: share * self.inertial_mass_kg,
+            weight_kn: share * self.weight_kn,
+            ..self
+        }
+    }
+
     /// Returns everything that drives the train but its basic resistance, in N: traction minus brake
     /// minus all that is known to retard it.
     #[inline]

@@ -8,7 +8,7 @@ use super::{Least, Parameter, Suspect};
 /// The list of `[track]` that holds [from in m, to in m, direction, factor].
 pub const LIST: &str = "masses";
 /// True over declared mass.
-pub const PARAMETER: Parameter = Parameter::new("mass_factor", (0.5, 2.0), 0.005);
+pub const PARAMETER: Parameter = Parameter::new("mass_factor", (0.4, 2.5), 0.005);
 /// A smaller share of the mass is not worth reporting.
 pub const LEAST_SHARE: f64 = 0.012;
 /// Standard deviation of a mass that was weighed, or declared for a run, as a share of it.

@@ -138,7 +138,7 @@ numbers! {
                 above(0.0, 1e5, "a mass in t above 0, at most 100000").times(1e3).required();
             /// Gross mass in kg with a full load, where it is declared; the nominal mass is the tare then.
             full_mass_kg: Option<f64> = None => FULL_MASS "mass_full_t",
-                above(0.0, 1e5, "a mass in t above mass_t, at most 100000").times(1e3);
+                above(0.0, 1e5, "a mass in t above mass_t, at most 8 times that").times(1e3);
             /// Length in m.
             length_m: f64 = 0.0 => LENGTH,
                 above(0.0, 1e4, "a length in m above 0, at most 10000").required();

@@ -8,7 +8,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use dynocar::cli::Failure;
-use dynocar::cli::check::{self as daemon_check, CheckArguments, or_refused};
+use dynocar::cli::check::{CheckArguments, or_refused};
+use dynocar::config::DaemonConfig;
 use dynocar::dataset::{DatasetSource, FileKind, LoadError, kind_of, labelled_text};
 use dynocar::output::{give, require_file, require_folder};
 use dynocar_analysis::dataset::{SourcePosition, parse_track, parse_train, top_keys};
@@ -89,7 +90,7 @@ pub fn understand(source: DatasetSource, samples: SamplesOfRuns) -> Result<Under
         FileKind::Dataset => return read_dataset(source, samples),
         FileKind::Train => understood.train = Some(Arc::new(parse_train(&label, &text)?)),
         FileKind::Track => understood.track = Some(Arc::new(parse_track(&label, &text)?)),
-        FileKind::Daemon => understood.daemon = Some(daemon_check::read(path)?),
+        FileKind::Daemon => understood.daemon = Some(DaemonConfig::load(path)?),
     }
     Ok(understood)
 }

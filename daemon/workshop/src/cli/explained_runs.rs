@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use std::path::PathBuf;
 
 use dynocar_analysis::dataset::{
-    Dataset, DatasetError, DatasetFiles, DatasetHead, Run, SourcePosition,
+    Dataset, DatasetError, DatasetFiles, DatasetHead, FORCE_NOT_RECORDED, Run, SourcePosition,
 };
 use dynocar_analysis::explain::evidence::{Density, RunData, RunDataError};
 use dynocar_analysis::explain::many::{Held, Many};
@@ -130,8 +130,13 @@ impl ExplainedRuns {
         let RunDataError::Simulate { file, source } = error;
         let label =
             FilesOfDataset::at(self.source()).map_or(file.clone(), |folder| folder.label(&file));
-        let diagnostics: String =
-            self.dataset.diagnostics().iter().map(|diagnostic| format!("; {diagnostic}")).collect();
+        let of_dataset = self.dataset.diagnostics();
+        let run = self.dataset.runs.iter().find(|run| run.file == file);
+        let unrecorded = run.into_iter().flat_map(|run| &run.diagnostics);
+        let unrecorded = unrecorded.filter(|it| it.code == FORCE_NOT_RECORDED);
+        let of_dataset = of_dataset.iter().map(|diagnostic| format!("; {diagnostic}"));
+        let of_run = unrecorded.map(|diagnostic| format!("; {}", diagnostic.text));
+        let diagnostics: String = of_dataset.chain(of_run).collect();
         Failure::At(SourcePosition::whole(&label), format!("{label}: {source}{diagnostics}"))
     }
 }

@@ -257,11 +257,12 @@ pub fn images(
     }
     for trace in &data.traces {
         let name = format!("speed_run_{}.svg", subject.number(&trace.file));
-        keep(name, speeds::draw(trace, Width::Wide, has_effect)?);
+        keep(name, speeds::draw(trace, subject.run(&trace.file), Width::Wide, has_effect)?);
     }
     for shown in &data.panels {
-        let run = shown.file.as_deref().map(|file| subject.number(file));
-        keep(panel_name(shown, run), panel::draw(shown, has_effect)?);
+        let number = shown.file.as_deref().map(|file| subject.number(file));
+        let run = shown.file.as_deref().and_then(|file| subject.run(file));
+        keep(panel_name(shown, number), panel::draw(shown, run, has_effect)?);
     }
     Ok(images)
 }

@@ -1,6 +1,6 @@
 //! Subject of a page: a dataset and its explanation.
 
-use dynocar_analysis::dataset::{Dataset, Role};
+use dynocar_analysis::dataset::{Dataset, Role, Run};
 use dynocar_analysis::explain::Explanation;
 use dynocar_analysis::explain::report::ReportData;
 use dynocar_analysis::explain::report::errors::RunErrors;
@@ -31,10 +31,14 @@ impl<'a> Subject<'a> {
         if self.has_effect() { "before" } else { "declared model, a, b, c refitted" }
     }
 
+    /// Returns the run of a file.
+    pub fn run(&self, file: &str) -> Option<&'a Run> {
+        self.dataset.runs.iter().find(|run| run.file == file)
+    }
+
     /// Returns the number of a run in the dataset, from 1; 0 for one that is not there.
     pub fn number(&self, file: &str) -> usize {
-        let runs = &self.dataset.runs;
-        runs.iter().find(|run| run.file == file).map_or(0, |run| run.number as usize)
+        self.run(file).map_or(0, |run| run.number as usize)
     }
 
     /// Returns the errors of the runs of a role, with their numbers.

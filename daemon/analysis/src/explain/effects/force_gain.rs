@@ -30,6 +30,7 @@ pub const OF_BRAKE: Policy =
 /// Proposes a gain of the traction force.
 pub fn of_traction(scan: &Scan) -> Proposal {
     scan.requires_force(|sample| sample.traction_force_n, "traction")?;
+    scan.requires_known_loads()?;
     let is_like_inertia = scan.are_inertia_and_traction_alike();
     if is_like_inertia && scan.fit.model.has(EffectKind::RotatingMass) {
         return Err(

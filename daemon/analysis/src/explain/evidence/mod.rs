@@ -12,6 +12,7 @@ mod criterion;
 mod drift;
 mod fit;
 mod integral;
+mod loads;
 mod model;
 mod noise;
 mod noise_search;

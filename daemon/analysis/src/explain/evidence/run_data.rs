@@ -17,6 +17,7 @@ use crate::statistics::span;
 use super::bins::{self, Bin};
 
 use super::drift::drift_m;
+use super::loads::estimate_loads;
 use super::positions::{by_part_s, distance_ratio};
 use super::sample_forces::DeclaredForces;
 use super::slides::mark_slides;
@@ -61,6 +62,8 @@ pub struct RunData {
     pub is_position_recorded: bool,
     /// True where gradients come from an accelerometer, which feels them together with the acceleration.
     pub is_gradient_felt: bool,
+    /// True where the load of each leg is what its traction moves: nobody weighed it.
+    pub are_loads_estimated: bool,
     /// The power from which the force comes.
     pub power: Option<RunPower>,
     /// Samples that validation refused.
@@ -255,6 +258,7 @@ fn prepare_run(
         }
     }
     let (mut samples, replaced) = readers.as_known.read(&rows);
+    let are_loads_estimated = estimate_loads(train, &mut samples);
     if run.power().is_none() {
         mark_slides(&mut samples);
     }
@@ -302,6 +306,7 @@ fn prepare_run(
         speed_late_s,
         is_position_recorded,
         is_gradient_felt: run.gradient_source == GradientSource::SpecificForce,
+        are_loads_estimated,
         power,
         rejected,
         replaced,

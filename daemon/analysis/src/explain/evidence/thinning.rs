@@ -100,8 +100,12 @@ const HALF_WINDOW: usize = 3;
 /// Least deviation of an outlier from the surrounding median, in usual deviations.
 const OUTLIER_SPREADS: f64 = 8.0;
 
-/// Sampling period in s above which the neighbours do not show whether a value is an outlier.
+/// Sampling periods in s above which a window is longer than a short application of the brake, and above which the
+/// neighbours do not show at all whether a value is an outlier.
+const DENSE_S: f64 = 0.25;
 const SPARSE_S: f64 = 0.5;
+/// How many times the steps around it a value's own steps have to be, to stand alone.
+const ALONE_TIMES: f64 = 2.0;
 /// Sharpest bend of a speed curve in m/s².
 const SPEED_BEND_MPS2: f64 = 1.5;
 
@@ -138,14 +142,14 @@ pub(super) fn replace_outliers(values: &mut [f64], least: f64) -> usize {
 /// Cleans forces, speeds and pressures of a run; returns the number of replaced values.
 ///
 /// A force counts as an outlier when it leaves its neighbours by a tenth of the run's greatest
-/// force, a speed by 0.25 m/s: less than that averages out. Samples more than `SPARSE_S` apart
-/// cannot distinguish an outlier from a short application of the brake, or from the bend of a speed where
-/// it ends: forces stay, except those next to a missing one, whose duration is unknown, and speeds
-/// may bend as sharply as a train's do.
+/// force, a speed by 0.25 m/s: less than that averages out. Where samples are more than `DENSE_S` apart, a force has
+/// to stand alone, too, since the peak of a short application leaves the window's median as far, and speeds may bend
+/// as sharply as a train's do. Those more than `SPARSE_S` apart cannot distinguish an outlier from such a peak:
+/// forces stay, except those next to a missing one, whose duration is unknown.
 pub(super) fn clean(samples: &mut [ResolvedSample], period_s: f64) -> usize {
     let mut speeds: Vec<f64> = samples.iter().map(|sample| sample.speed_mps).collect();
-    let is_sparse = period_s > SPARSE_S;
-    let bend_mps = if is_sparse { SPEED_BEND_MPS2 * HALF_WINDOW as f64 * period_s } else { 0.0 };
+    let (is_dense, is_sparse) = (period_s <= DENSE_S, period_s > SPARSE_S);
+    let bend_mps = if is_dense { 0.0 } else { SPEED_BEND_MPS2 * HALF_WINDOW as f64 * period_s };
     let mut replaced = replace_outliers(&mut speeds, 0.25 + bend_mps);
     for (sample, speed_mps) in samples.iter_mut().zip(speeds) {
         sample.speed_mps = speed_mps;
@@ -160,6 +164,7 @@ pub(super) fn clean(samples: &mut [ResolvedSample], period_s: f64) -> usize {
             (0..samples.len()).filter(|&row| field(&mut samples[row]).is_some()).collect();
         let mut values: Vec<f64> =
             rows.iter().map(|&row| field(&mut samples[row]).unwrap_or(0.0)).collect();
+        let recorded = values.clone();
         let mut sorted = values.clone();
         sorted.sort_unstable_by(f64::total_cmp);
         let high = sorted.get(sorted.len() * 99 / 100).copied().unwrap_or(0.0);
@@ -170,15 +175,32 @@ pub(super) fn clean(samples: &mut [ResolvedSample], period_s: f64) -> usize {
             .iter()
             .map(|&row| is_missing(row + 1) || is_missing(row.wrapping_sub(1)))
             .collect();
-        for ((&row, &value), is_open) in rows.iter().zip(&values).zip(is_open) {
+        for (at, (&row, &value)) in rows.iter().zip(&values).enumerate() {
             let own = field(&mut samples[row]);
-            if *own != Some(value) && (is_open || !is_sparse) {
+            let is_outlier = is_dense || is_open[at] || (!is_sparse && is_alone(&recorded, at));
+            if *own != Some(value) && is_outlier {
                 *own = Some(value);
                 replaced += 1;
             }
         }
     }
     replaced
+}
+
+/// Returns whether a value leaves both neighbours on one side, by far more than its neighbours leave theirs.
+fn is_alone(values: &[f64], at: usize) -> bool {
+    let step = |from: usize| {
+        let pair = values.get(from).zip(values.get(from + 1));
+        pair.map_or(0.0, |(one, other)| other - one)
+    };
+    let Some(before) = at.checked_sub(1) else { return false };
+    let (up, down) = (step(before), -step(at));
+    let mut around =
+        [step(at.saturating_sub(2)), step(at.saturating_sub(3)), step(at + 1), step(at + 2)]
+            .map(f64::abs);
+    around.sort_unstable_by(f64::total_cmp);
+    // The greatest may be the step of another outlier.
+    up * down > 0.0 && up.abs().min(down.abs()) > ALONE_TIMES * around[2]
 }
 
 #[cfg(test)]
@@ -263,6 +285,19 @@ mod cleaning_tests {
         sparse[28].brake_force_n = None;
         assert_eq!(clean(&mut sparse, 1.0), 1, "nobody knows how long it lasted");
         assert_eq!(sparse[27].brake_force_n, Some(0.0));
+    }
+
+    #[test]
+    fn a_peak_half_a_second_long_is_kept_and_a_value_that_stands_alone_is_not() {
+        let peak = [0.0, 30e3, 68e3, 106e3, 131e3, 103e3, 81e3, 40e3];
+        let force_n = |row: usize| if row % 40 < 8 { peak[row % 40] } else { 0.0 };
+        let sample =
+            |row: usize| ResolvedSample { traction_force_n: Some(force_n(row)), ..coasting() };
+        let mut samples: Vec<ResolvedSample> = (0..400).map(sample).collect();
+        samples[110].traction_force_n = Some(150e3);
+        assert_eq!(clean(&mut samples, 0.5), 1);
+        assert_eq!(samples[110].traction_force_n, Some(0.0));
+        assert_eq!(samples[124].traction_force_n, Some(131e3));
     }
 
     #[test]

@@ -289,7 +289,8 @@ fn precision(place: &Location) -> Option<String> {
 fn unit_of_range(place: &Location) -> &'static str {
     let name = place.covariate.as_ref().map_or("", |it| it.name.as_str());
     match name.rsplit('_').next() {
-        _ if place.speed_range_mps.is_some() => "m/s",
+        // A range of another covariate is that of it, whichever speeds it covers.
+        Some("") if place.speed_range_mps.is_some() => "m/s",
         Some("mps") => "m/s",
         Some("mps2") => "m/s²",
         Some("m") => "m",

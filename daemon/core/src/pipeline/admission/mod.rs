@@ -60,6 +60,11 @@ impl Admission {
         }
     }
 
+    /// Refuses positions of a train of this length in m off a line of this length in m.
+    pub fn keep_on_line(&mut self, line_m: f64, train_m: f64) {
+        self.validator.keep_on_line(line_m, train_m);
+    }
+
     /// Counts positions as measured or not: those that are integrated from the speed show nothing about it.
     pub fn set_position_measured(&mut self, is_measured: bool) {
         self.watch.is_position_measured = is_measured;

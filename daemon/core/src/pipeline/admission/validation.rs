@@ -15,6 +15,8 @@ use super::limits::{
 
 /// After this many refusals in a row that agree with each other, the past is given up.
 const REFUSALS_BEFORE_RESTART: u32 = 5;
+/// Distance in m beyond a line's ends, and half of the train, up to which a position is an odometer's error.
+const OFF_LINE_M: f64 = 200.0;
 
 /// The newest gap in the sequence numbers, which may turn out not to be a gap.
 #[derive(Clone, Copy, Debug)]
@@ -34,6 +36,8 @@ struct Gap {
 pub struct Validator {
     train: u64,
     nominal_mass_kg: f64,
+    /// Least and greatest position in m on the line; `None` where its length is not known.
+    on_line_m: Option<(f64, f64)>,
     last: Option<TrainSample>,
     /// The run of the newest sample.
     run: Option<u32>,
@@ -52,6 +56,12 @@ impl Validator {
         Validator { train: train.0, nominal_mass_kg, ..Validator::default() }
     }
 
+    /// Refuses positions of a train of this length in m off a line of this length in m.
+    pub fn keep_on_line(&mut self, line_m: f64, train_m: f64) {
+        let beyond_m = OFF_LINE_M + 0.5 * train_m;
+        self.on_line_m = Some((-beyond_m, line_m + beyond_m));
+    }
+
     /// Returns the samples that never arrived so far.
     pub fn lost(&self) -> u64 {
         self.lost
@@ -68,6 +78,7 @@ impl Validator {
     pub fn exchange(&mut self, other: &mut Validator) {
         std::mem::swap(self, other);
         std::mem::swap(&mut self.nominal_mass_kg, &mut other.nominal_mass_kg);
+        std::mem::swap(&mut self.on_line_m, &mut other.on_line_m);
         let segment = self.segment.max(other.segment);
         for it in [self, other] {
             (it.segment, it.last) = (segment, None);
@@ -178,8 +189,17 @@ impl Validator {
         }
         let mut known =
             SampleField::ALL.into_iter().filter_map(|it| Some((it.range(), sample.get(it)?)));
-        let is_plausible = known.all(|((low, high), value)| (low..=high).contains(&value));
-        if is_plausible { Ok(()) } else { Err(RejectionReason::OutOfRange) }
+        if !known.all(|((low, high), value)| (low..=high).contains(&value)) {
+            return Err(RejectionReason::OutOfRange);
+        }
+        match (self.on_line_m, sample.get(SampleField::Position)) {
+            (Some((low_m, high_m)), Some(position_m))
+                if !(low_m..=high_m).contains(&position_m) =>
+            {
+                Err(RejectionReason::PositionJump)
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Returns the step in s since the last accepted sample, `None` when a new segment starts here.

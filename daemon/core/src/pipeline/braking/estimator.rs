@@ -129,6 +129,10 @@ impl<E: Engine> BrakingEstimator<E> {
     /// Returns whether the rail carries less than the brake would need, so that the coefficient is that
     /// of the rail and not only a lower bound of it.
     fn is_rail_limited(&self, estimate: &BrakingEstimate) -> bool {
+        // A brake that does more than it reports, or a lighter train than is known, leaves no rail that limits it.
+        if estimate.coefficient.value >= estimate.demand {
+            return false;
+        }
         if let Some(probability) = estimate.brake_limited {
             return probability <= 0.5;
         }

@@ -52,6 +52,8 @@ pub struct ResidualMonitor {
     has_stopped: bool,
     /// Mass in kg of the newest sample.
     given_kg: f64,
+    /// Middle in kg of tare and full where the mass is anything between them, and no sample says which.
+    open_load_kg: Option<f64>,
     places: PlaceMemory,
     pressure: ReleasedPressure,
     wheels: WheelScale,
@@ -99,6 +101,7 @@ impl ResidualMonitor {
             clock: RunClock::default(),
             has_stopped: false,
             given_kg: train.mass_kg,
+            open_load_kg: train.load_range().map(|(middle_kg, _)| middle_kg),
             places: PlaceMemory::new(),
             pressure: ReleasedPressure::new(),
             wheels: WheelScale::default(),
@@ -131,7 +134,9 @@ impl ResidualMonitor {
         for scale in [TRACTION_SCALE, BRAKE_SCALE] {
             self.information.loosen(scale, self.settings.force_run_std);
         }
-        self.reopen(LOAD);
+        if self.open_load_kg.is_none() {
+            self.reopen(LOAD);
+        }
         self.reopen(DAY_WIND);
         self.places.next_pass();
         self.pressure.restart();
@@ -148,6 +153,9 @@ impl ResidualMonitor {
 
     /// The train has stopped and moves again: effects that may change at stops are unknown anew.
     fn start_leg(&mut self) {
+        if self.open_load_kg.is_some() {
+            self.reopen(LOAD);
+        }
         self.onsets.start_leg();
         self.verdict.start_leg();
         for place in (0..SUSPECTS).filter(|&place| BANK[place].changes_at_stops) {
@@ -309,6 +317,8 @@ impl Estimator for ResidualMonitor {
     }
 
     fn update(&mut self, sample: &ResolvedSample) -> Outcome {
+        self.open_load_kg = self.open_load_kg.filter(|_| !sample.is_mass_measured);
+        let sample = &self.open_load_kg.map_or(*sample, |kg| sample.with_mass(kg));
         self.weight_kn = sample.weight_kn;
         self.newest_ns = sample.time_ns;
         if sample.step_s > 0.0 {

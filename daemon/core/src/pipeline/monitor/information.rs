@@ -307,10 +307,8 @@ pub fn usual(
     base_std[TRACTION_SCALE] = 0.01 * settings.force_std_percent;
     base_std[BRAKE_SCALE] = 0.01 * settings.force_std_percent;
     base_std[FORCE_DELAY] = settings.data.force_delay_std_s;
-    // A declared tare stands for any load up to the full one: the mean square of all of them.
-    let loads = train.load_range().map_or(0.0, |(middle_kg, std_kg)| {
-        (middle_kg - train.mass_kg).hypot(std_kg) / train.mass_kg
-    });
+    // A load that nobody weighs counts from the middle of tare and full.
+    let loads = train.load_range().map_or(0.0, |(middle_kg, std_kg)| std_kg / middle_kg);
     base_std[LOAD] = (0.01 * settings.mass_std_percent).max(loads);
     base_std[DAY_WIND] = settings.wind_std_mps;
     let curve = settings.curve_constant_std * 1e-3 * train.curve_constant_n_per_kn_m;

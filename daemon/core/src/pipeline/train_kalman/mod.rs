@@ -41,7 +41,7 @@ settings! {
         /// Standard deviation in % by which the load changes at a stop where the samples carry no mass.
         load_change_std_percent: f64 = 10.0 => (0 to 50);
         /// Shortest stop in s at which the load may change.
-        stop_min_s: f64 = 5.0 => (0 to 3600);
+        stop_min_s: f64 = 1.0 => (0 to 3600);
         /// Standard deviation of each declared coefficient of resistance as a share of it.
         prior_relative_std: f64 = 0.4 => (0.001 to 10);
         /// Random walk of the resistance in N/kN over an hour of motion: weather, wear.

@@ -53,7 +53,9 @@ fn train(train: &TrainModel) -> String {
         signed(davis.c)
     );
     let mut text = format!("train    {}\n", train.name);
-    let mass_t = short(train.mass_kg / 1000.0, 3);
+    let tons = |kg: f64| short(kg / 1000.0, 3);
+    let full = train.full_mass_kg.map(|it| format!(" to {}", tons(it)));
+    let mass_t = tons(train.mass_kg) + &full.unwrap_or_default();
     let gamma = short(train.rotating_mass_factor, 6);
     text += &line("mass", &format!("{mass_t} t, rotating-mass factor {gamma}"));
     let cars = if train.cars == 1 { "1 car".into() } else { format!("{} cars", train.cars) };

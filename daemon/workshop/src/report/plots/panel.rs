@@ -1,11 +1,12 @@
 //! The residual force against one covariate.
 
+use dynocar_analysis::dataset::Run;
 use dynocar_analysis::explain::report::covariates::Covariate;
 use dynocar_analysis::explain::report::panels::{Panel, PanelBin};
 use plotters::element::{Circle, PathElement};
 use plotters::style::{Color, RGBColor};
 
-use crate::run_facts::moment;
+use crate::run_facts::beginning;
 
 use super::axes::{
     Axis, Chart, band, chart, frame, padded, range_with_zero, shade, stroke, zero_line,
@@ -25,8 +26,8 @@ const APART: f64 = 0.004;
 /// # Errors
 ///
 /// When the drawing fails.
-pub fn draw(panel: &Panel, has_effect: bool) -> Result<Plot, PlotError> {
-    let (panel, since) = &from_start(panel);
+pub fn draw(panel: &Panel, run: Option<&Run>, has_effect: bool) -> Result<Plot, PlotError> {
+    let (panel, since) = &from_start(panel, run);
     let svg = picture(&label(panel, has_effect), "panel", SIZE, |area| {
         let is_category = panel.covariate.is_category();
         let room = if is_category { 0.0 } else { 0.03 };
@@ -65,20 +66,19 @@ pub fn draw(panel: &Panel, has_effect: bool) -> Result<Plot, PlotError> {
     Ok(Plot { svg, readings: vec![reading] })
 }
 
-/// Returns the panel; where times of a run count from 1970, it counts them from the run's start, and returns the new
-/// title.
-fn from_start(panel: &Panel) -> (Panel, Option<String>) {
+/// Returns the panel; where the beginning of a run's times is known, it counts them from there, and returns the new title.
+fn from_start(panel: &Panel, run: Option<&Run>) -> (Panel, Option<String>) {
     let mut panel = panel.clone();
     let first_s = panel.bins.first().map_or(0.0, |bin| bin.at);
     let start = match panel.covariate {
-        Covariate::TimeInRun(_) => moment(first_s),
+        Covariate::TimeInRun(_) => beginning(first_s, run),
         _ => None,
     };
-    if start.is_some() {
-        panel.bins.iter_mut().for_each(|bin| bin.at -= first_s.floor());
-        panel.acting.iter_mut().flatten().for_each(|time_s| *time_s -= first_s.floor());
+    if let Some((_, start_s)) = start {
+        panel.bins.iter_mut().for_each(|bin| bin.at -= start_s);
+        panel.acting.iter_mut().flatten().for_each(|time_s| *time_s -= start_s);
     }
-    (panel, start.map(|start| format!("Time since {start}")))
+    (panel, start.map(|(start, _)| format!("Time since {start}")))
 }
 
 /// A mean of a bin, with its half width.
@@ -200,7 +200,7 @@ mod tests {
 
     #[test]
     fn both_sides_have_a_point_and_a_whisker_for_each_bin() {
-        let svg = draw(&panel(), true).unwrap().svg;
+        let svg = draw(&panel(), None, true).unwrap().svg;
         assert_eq!(svg.matches("<circle").count(), 16);
         assert_eq!(svg.matches("<polygon").count(), 1);
         assert!(svg.contains("Chainage, km") && svg.contains("fill=\"#E4EEF7\""));
@@ -211,16 +211,16 @@ mod tests {
     fn times_that_count_from_1970_are_shown_from_their_start_with_its_date() {
         let mut of_run = Panel { covariate: Covariate::TimeInRun(0), ..panel() };
         of_run.bins.iter_mut().for_each(|bin| bin.at += 1_738_479_600.0);
-        let plot = draw(&of_run, true).unwrap();
+        let plot = draw(&of_run, None, true).unwrap();
         assert!(plot.svg.contains("Time since 2025-02-02T07:00:00Z, s"), "{}", plot.svg);
         assert_eq!(plot.readings[0].at[..2], [0.0, 1.0]);
         let from_start = Panel { covariate: Covariate::TimeInRun(0), ..panel() };
-        assert!(draw(&from_start, true).unwrap().svg.contains("Time in the run, s"));
+        assert!(draw(&from_start, None, true).unwrap().svg.contains("Time in the run, s"));
     }
 
     #[test]
     fn without_an_effect_there_is_no_after() {
-        let svg = draw(&panel(), false).unwrap().svg;
+        let svg = draw(&panel(), None, false).unwrap().svg;
         assert_eq!(svg.matches("<circle").count(), 8);
         assert!(!svg.contains("after"));
     }

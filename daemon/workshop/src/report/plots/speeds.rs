@@ -1,10 +1,11 @@
 //! Measured and predicted speed of a run, and the error of the prediction below it.
 
+use dynocar_analysis::dataset::Run;
 use dynocar_analysis::explain::report::timeline::{SpeedPoint, Trace};
 use plotters::element::PathElement;
 use plotters::style::RGBColor;
 
-use crate::run_facts::moment;
+use crate::run_facts::beginning;
 
 use super::axes::{Axis, Chart, chart, frame, padded, range_with_zero, shade, stroke, zero_line};
 use super::picture::{
@@ -17,8 +18,13 @@ use super::reading::PointerReading;
 /// # Errors
 ///
 /// When the drawing fails.
-pub fn draw(trace: &Trace, width: Width, has_effect: bool) -> Result<Plot, PlotError> {
-    let (trace, time) = &from_start(trace);
+pub fn draw(
+    trace: &Trace,
+    run: Option<&Run>,
+    width: Width,
+    has_effect: bool,
+) -> Result<Plot, PlotError> {
+    let (trace, time) = &from_start(trace, run);
     let (nominal, above, below) = width.size();
     let size = (nominal, above + below);
     let svg = picture(&label(trace, has_effect), width.class(), size, |area| {
@@ -67,11 +73,11 @@ fn predicted(has_effect: bool) -> impl Iterator<Item = Predicted> {
     both.into_iter().take(1 + usize::from(has_effect))
 }
 
-/// Returns the run, with times from its start where they count from 1970, and the title of its time axis.
-fn from_start(trace: &Trace) -> (Trace, String) {
+/// Returns the run, with times from its beginning where that is known, and the title of its time axis.
+fn from_start(trace: &Trace, run: Option<&Run>) -> (Trace, String) {
     let mut trace = trace.clone();
     let first_s = trace.pieces.iter().flatten().map(|point| point.time_s).reduce(f64::min);
-    let Some((start, start_s)) = first_s.and_then(|it| Some((moment(it)?, it.floor()))) else {
+    let Some((start, start_s)) = first_s.and_then(|it| beginning(it, run)) else {
         return (trace, "Time in the recording".into());
     };
     trace.pieces.iter_mut().flatten().for_each(|point| point.time_s -= start_s);
@@ -144,7 +150,7 @@ mod tests {
                 rmse_mps: None,
                 acting_s: vec![[from_s + 20.0, from_s + 40.0]],
             };
-            draw(&trace, Width::Narrow, true).unwrap()
+            draw(&trace, None, Width::Narrow, true).unwrap()
         };
         let plot = drawn(1_738_479_600.0);
         assert!(plot.svg.contains("Time since 2025-02-02T07:00:00Z, s"), "{}", plot.svg);

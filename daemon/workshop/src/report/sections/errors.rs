@@ -170,7 +170,8 @@ fn key(subject: &Subject, has_lines: bool) -> String {
 }
 
 fn trace_figure(subject: &Subject, trace: &Trace) -> Result<String, PlotError> {
-    let plots = wide_and_narrow(|width| speeds::draw(trace, width, subject.has_effect()))?;
+    let run = subject.run(&trace.file);
+    let plots = wide_and_narrow(|width| speeds::draw(trace, run, width, subject.has_effect()))?;
     let errors = match trace.rmse_mps {
         Some([before, after]) if subject.has_effect() => {
             format!(": {before:.3} m/s before, {after:.3} m/s after")

@@ -44,7 +44,11 @@ pub fn section(subject: &Subject) -> Result<PageSection, PlotError> {
             "",
             &format!("{}{note}", escape(&title)),
             "",
-            &[panel::draw(panel, has_effect)?],
+            &[panel::draw(
+                panel,
+                panel.file.as_deref().and_then(|it| subject.run(it)),
+                has_effect,
+            )?],
         );
     }
     body += "</div>\n";

@@ -26,6 +26,7 @@ pub const POLICY: Policy =
 
 /// Proposes structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
+    scan.requires_known_loads()?;
     let mut candidates = Vec::new();
     let sections = all_sections(scan);
     if !sections.is_empty() {

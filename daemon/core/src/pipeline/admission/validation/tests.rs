@@ -54,6 +54,23 @@ fn a_bad_value_is_refused_with_its_reason() {
 }
 
 #[test]
+fn a_position_off_the_line_is_refused_where_its_length_is_known() {
+    let at = |position_m: f64| cruising(0).with(SampleField::Position, position_m);
+    let checked = |validator: &mut Validator, position_m| validator.check(&at(position_m)).err();
+    assert_eq!(checked(&mut validator(), 5_300.0), None, "no line is known");
+    for (position_m, expected) in [
+        (5_240.0, None),
+        (5_260.0, Some(RejectionReason::PositionJump)),
+        (-240.0, None),
+        (-260.0, Some(RejectionReason::PositionJump)),
+    ] {
+        let mut validator = validator();
+        validator.keep_on_line(5_000.0, 100.0);
+        assert_eq!(checked(&mut validator, position_m), expected, "{position_m} m");
+    }
+}
+
+#[test]
 fn repeated_and_reversed_samples_are_refused() {
     let mut validator = validator();
     validator.check(&cruising(5)).unwrap();
