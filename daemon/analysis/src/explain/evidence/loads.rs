@@ -1,9 +1,9 @@
 //! Loads that nobody weighed, of a train that declares tare and full load: between two stops, the mass that the traction
 //! force moves.
 //!
-//! While the train pulls, the impulse of the force is the mass times what the motion shows: the change of speed with
-//! the rotating mass, the climb, and the declared resistance. Where it hardly pulls, the mass is the middle of the
-//! declared range.
+//! While the train pulls, the impulse of the force is the mass times the gain that the motion shows: the change of
+//! speed with the rotating mass, the climb, and the declared resistance. Where it hardly pulls, the mass is the middle of
+//! the declared range.
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::simulate::STANDING_MPS;

@@ -62,7 +62,7 @@ pub struct RunData {
     pub is_position_recorded: bool,
     /// True where gradients come from an accelerometer, which feels them together with the acceleration.
     pub is_gradient_felt: bool,
-    /// True where the load of each leg is what its traction moves: nobody weighed it.
+    /// True where nobody weighed the load, and each leg has the mass that its traction moves.
     pub are_loads_estimated: bool,
     /// The power from which the force comes.
     pub power: Option<RunPower>,
@@ -279,13 +279,11 @@ fn prepare_run(
         recording.samples().iter().map(|sample| sample.covariate(*of).unwrap_or(f64::NAN)).collect()
     };
     let covariates = Covariate::ALL.iter().map(of_samples).collect();
-    let directions = recording.samples().iter().map(|sample| sample.direction).collect();
-    let shares = recording.samples().iter().map(|sample| sample.tunnel_share.unwrap_or(0.0));
-    let tunnel_share = shares.collect();
-    let stamps =
-        recording.samples().iter().map(|sample| (sample.time_ns, sample.segment)).collect();
-    let positions_m = recording.samples().iter().filter_map(|sample| sample.position_m);
-    let span_m = span(positions_m);
+    let each = || recording.samples().iter();
+    let directions = each().map(|sample| sample.direction).collect();
+    let tunnel_share = each().map(|sample| sample.tunnel_share.unwrap_or(0.0)).collect();
+    let stamps = each().map(|sample| (sample.time_ns, sample.segment)).collect();
+    let span_m = span(each().filter_map(|sample| sample.position_m));
     let bins = bins::bins(&recording);
     let power = RunPower::of(run, recording.samples());
     Ok(RunData {
