@@ -92,7 +92,7 @@ mod tests {
             assert_eq!(
                 words,
                 format!(
-                    "{place}: {table}.directory = none/x: expected an existing directory, found none at {full}"
+                    "{place}:5: {table}.directory = none/x: expected an existing directory, found none at {full}"
                 )
             );
         }
