@@ -111,5 +111,5 @@ fn a_load_is_opened_while_the_train_stands() {
             matches!(load.see(&sample), Some(LoadChange::Opened { .. }))
         })
         .collect();
-    assert_eq!(opened_at, [15]);
+    assert_eq!(opened_at, [11]);
 }
