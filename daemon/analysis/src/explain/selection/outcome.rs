@@ -7,7 +7,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{Cholesky, DMatrix};
 
 use super::deviations::deviations_with_nuisance;
-use crate::explain::effects::{AtBound, SharedHypothesis, policy_of};
+use crate::explain::effects::{AtBound, SharedHypothesis};
 use crate::explain::evidence::{Fit, acceptance_score};
 use crate::statistics::rms;
 
@@ -79,13 +79,13 @@ impl NuisanceFit {
     }
 
     /// Returns whether nothing is left of an effect: the 95 % interval of its size holds zero, and of several masses, or
-    /// of a dead time and a lag, that of each.
+    /// of a late brake's dead time and lag, that of each.
     pub(super) fn holds_none(&self, index: usize) -> bool {
         let range = self.fit.model.ranges()[index].clone();
         let effect = &self.fit.model.effects[index];
         let std = deviations_with_nuisance(&self.fit, range.end, self.shared).std;
         let kind = effect.kind();
-        if kind == EffectKind::MassChange || policy_of(kind).is_late {
+        if matches!(kind, EffectKind::MassChange | EffectKind::BrakeDelay) {
             let away = |i: usize| (self.fit.theta[i] - effect.none()).abs();
             return range.into_iter().all(|i| away(i) < HALF_95 * std[i]);
         }
