@@ -143,18 +143,10 @@ fn is_chosen_among_many(effect: &SharedHypothesis) -> bool {
     policy_of(effect.kind()).is_one_of_many || !effect.ends().is_empty()
 }
 
-/// Size of an effect in standard deviations by the scatter between the runs; of a late brake's dead time and lag, which
-/// take each other's place, that of their sum. Both forces are everyday late, and certain by more than that.
+/// Size of an effect in standard deviations by the scatter between the runs.
 fn stds_from_none(fit: &Fit, index: usize) -> f64 {
-    let effect = &fit.model.effects[index];
-    let (parameters, range) = (fit.effect_parameters(index), fit.model.ranges()[index].clone());
-    let deviations = deviations(fit);
-    if effect.kind() == EffectKind::BrakeDelay {
-        let own = (range.start, range.start);
-        let variance = deviations.covariance.view(own, (range.len(), range.len())).sum();
-        return parameters.iter().sum::<f64>() / variance.max(0.0).sqrt();
-    }
-    effect.size(parameters).abs() / deviations.std[range.start]
+    let size = fit.model.effects[index].size(fit.effect_parameters(index)).abs();
+    size / deviations(fit).std[fit.model.ranges()[index].start]
 }
 
 /// Returns whether an effect shows in enough runs. A form without a name must show in several runs where there are

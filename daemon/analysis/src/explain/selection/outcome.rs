@@ -78,14 +78,13 @@ impl NuisanceFit {
         fit.theta == from && effects.all(|(one, other)| Arc::ptr_eq(one, other))
     }
 
-    /// Returns whether nothing is left of an effect: the 95 % interval of its size holds zero, and of several masses, or
-    /// of a late brake's dead time and lag, that of each.
+    /// Returns whether nothing is left of an effect: the 95 % interval of its size holds zero, and of several masses that
+    /// of each.
     pub(super) fn holds_none(&self, index: usize) -> bool {
         let range = self.fit.model.ranges()[index].clone();
         let effect = &self.fit.model.effects[index];
         let std = deviations_with_nuisance(&self.fit, range.end, self.shared).std;
-        let kind = effect.kind();
-        if matches!(kind, EffectKind::MassChange | EffectKind::BrakeDelay) {
+        if effect.kind() == EffectKind::MassChange {
             let away = |i: usize| (self.fit.theta[i] - effect.none()).abs();
             return range.into_iter().all(|i| away(i) < HALF_95 * std[i]);
         }
