@@ -97,8 +97,8 @@ impl NuisanceFit {
         !self.fit.model.effects[index].is_material(parameters, self.fit.theta[2])
     }
 
-    /// Returns whether a change of mass in single runs is the usual scatter of loads: the largest k of n deviations are
-    /// about √(2 ln (n / k)) of their standard deviation, which the other runs show, and a little more where they are many.
+    /// Returns whether a change of mass in single runs is the usual scatter of loads: the largest of several deviations
+    /// is about √(2 ln n) of their standard deviation, which the other runs show.
     pub(super) fn is_as_loads_are(&self, index: usize) -> bool {
         let fit = &self.fit;
         let effect = &fit.model.effects[index];
@@ -109,10 +109,7 @@ impl NuisanceFit {
         let std = deviations_with_nuisance(fit, range.end, self.shared).std;
         let away =
             range.map(|i| (fit.theta[i] - effect.none()) / std[i].hypot(fit.noise.scatter.force));
-        let away: Vec<f64> = away.collect();
-        let (all, few) = (fit.runs.len() as f64, away.len() as f64);
-        let largest = (2.0 * (all / few).max(1.0).ln()).sqrt();
-        rms(&away) < largest + MANY_LOADS_STDS * (1.0 - 1.0 / few)
+        rms(&away.collect::<Vec<_>>()) < (2.0 * (fit.runs.len() as f64).ln()).sqrt()
     }
 }
 
@@ -206,9 +203,6 @@ impl SearchOutcome {
         self.small.iter().filter_map(of)
     }
 }
-
-/// Standard deviations that the larger half of deviations lie beyond √(2 ln 2) of theirs at most.
-const MANY_LOADS_STDS: f64 = 0.4;
 
 /// Share of the error below which a weak effect is refused for removing too little, above for too little evidence.
 const LITTLE: f64 = 0.2;
