@@ -27,10 +27,15 @@ fn dataset(folder: &Path) -> Dataset {
 
 /// Returns the answer for a row of the brake scenarios, for a tram whose samples carry its mass.
 fn answer(row: &str) -> ExplainAnswer {
+    answer_with(row, LoadSource::Exact)
+}
+
+/// Returns the answer for a row of the brake scenarios.
+fn answer_with(row: &str, load: LoadSource) -> ExplainAnswer {
     let mut rows = table::brakes();
     rows.retain(|(names, _)| names.join(", ") == row);
     let mut scenario = rows[0].1;
-    (scenario.load, scenario.rate_hz) = (LoadSource::Exact, 10);
+    (scenario.load, scenario.rate_hz) = (load, 10);
     let folder = tempfile::tempdir().unwrap();
     let world = World::draw(scenario, Mistakes::default(), SEED);
     write_dataset(world, HOURS, folder.path()).unwrap();
@@ -54,6 +59,14 @@ fn named(answer: &ExplainAnswer, parameter: &str) -> (Vec<&'static str>, Uncerta
 fn friction_that_acts_late_is_a_late_brake() {
     let (kinds, late_s) =
         named(&answer("tram, friction, lag 0.25 s, map 0.1 ‰"), "delay_and_lag_s");
+    assert_eq!(kinds, ["brake_delay"]);
+    assert!((late_s.value - 0.25).abs() < 0.05 && late_s.std < 0.1, "{late_s:?}");
+}
+
+#[test]
+fn friction_that_acts_late_is_a_late_brake_where_nothing_weighs_the_passengers() {
+    let answer = answer_with("tram, friction, lag 0.25 s, map 0.1 ‰", LoadSource::Passengers);
+    let (kinds, late_s) = named(&answer, "delay_and_lag_s");
     assert_eq!(kinds, ["brake_delay"]);
     assert!((late_s.value - 0.25).abs() < 0.05 && late_s.std < 0.1, "{late_s:?}");
 }

@@ -71,7 +71,7 @@ pub fn start_log(config: &DaemonConfig) -> Result<Log, Failure> {
 #[derive(Debug, Args)]
 pub struct DemoArguments {
     /// How many times as fast as recorded
-    #[arg(long, default_value_t = 200.0, value_name = "K")]
+    #[arg(long, default_value_t = 400.0, value_name = "K")]
     rate: f64,
     /// Write the result for machines; - for standard output
     #[arg(long, value_name = "FILE")]

@@ -1,6 +1,7 @@
 //! Whether a trial is more than chance, large enough to matter, and seen in the runs. An effect is accepted because it
 //! removes much of the error for its evidence, or because it is certain; a refusal states its reason.
 
+use dynocar_model::terms::delay;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::deviations::{deviations, scatter_factor};
@@ -143,10 +144,18 @@ fn is_chosen_among_many(effect: &SharedHypothesis) -> bool {
     policy_of(effect.kind()).is_one_of_many || !effect.ends().is_empty()
 }
 
-/// Size of an effect in standard deviations by the scatter between the runs.
+/// Size of an effect in standard deviations by the scatter between the runs. A dead time and a lag take each other's
+/// place: for a late brake both together count, beyond the usual lateness.
 fn stds_from_none(fit: &Fit, index: usize) -> f64 {
-    let size = fit.model.effects[index].size(fit.effect_parameters(index)).abs();
-    size / deviations(fit).std[fit.model.ranges()[index].start]
+    let (effect, parameters) = (&fit.model.effects[index], fit.effect_parameters(index));
+    let range = fit.model.ranges()[index].clone();
+    let deviations = deviations(fit);
+    if effect.kind() == EffectKind::BrakeDelay {
+        let own =
+            deviations.covariance.view((range.start, range.start), (range.len(), range.len()));
+        return (parameters.iter().sum::<f64>() - delay::LEAST_S) / own.sum().max(0.0).sqrt();
+    }
+    effect.size(parameters).abs() / deviations.std[range.start]
 }
 
 /// Returns whether an effect shows in enough runs. A form without a name must show in several runs where there are
