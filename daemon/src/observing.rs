@@ -4,7 +4,7 @@
 use dynocar_client::{Reading, SnapshotReader};
 use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::vocabulary::EffectKind;
-use dynocar_shared::{Reason, TrainId, vocabulary};
+use dynocar_shared::{ParameterSnapshot, Reason, TrainId, vocabulary};
 use dynocar_transport::{Announcement, ChannelError, Host, Peer, Role, monotonic_now_ns};
 
 use crate::operator::{Suspicion, pipeline_name};
@@ -41,6 +41,12 @@ impl ObservedSelection {
         newcomers.dedup();
         Ok(newcomers)
     }
+}
+
+/// Returns the time in s since the newest sample behind a snapshot was published; `None` before the first.
+pub fn sample_age_s(snapshot: &ParameterSnapshot, now_ns: i64) -> Option<f64> {
+    let age_ns = now_ns.saturating_sub(snapshot.sample_published_ns).max(0);
+    (snapshot.sample_sequence > 0).then_some(age_ns as f64 * 1e-9)
 }
 
 /// Latest observed state of a pipeline.

@@ -216,6 +216,10 @@ impl core::error::Error for StoppingError {}
 const RESPONSE_MAX_S: f64 = 300.0;
 /// No brake decelerates by more, on any track: the mass is in t, or the forces in another unit than N.
 const DECELERATION_MAX_MPS2: f64 = 10.0;
+/// A brake that decelerates by less, and is there at all, is stated in another unit than N.
+const DECELERATION_MIN_MPS2: f64 = 0.01;
+/// No rail carries more of the weight: the coefficient is in per cent.
+const COEFFICIENT_MAX: f64 = 1.5;
 
 /// How far each uncertain quantity is moved to its unfavourable side, in standard deviations.
 #[derive(Clone, Copy)]
@@ -308,6 +312,9 @@ impl Stop<'_> {
             require(is_not_negative(given.value), "adhesion", given.value)?;
             require(is_not_negative(given.std), "adhesion", given.std)?;
         }
+        if let RailAdhesion::Coefficient(given) = self.adhesion {
+            require(given.value <= COEFFICIENT_MAX, "adhesion", given.value)?;
+        }
         require(!self.brake_effort.is_empty(), "brake_effort", f64::NAN)?;
         for point in self.brake_effort {
             require(point.speed_mps.is_finite(), "brake_effort", point.speed_mps)?;
@@ -319,6 +326,8 @@ impl Stop<'_> {
         }
         let forces_n = self.brake_effort.iter().map(|point| point.force_n);
         let greatest_n = self.brake_scale.value * forces_n.fold(0.0, f64::max);
+        let is_brake = greatest_n == 0.0 || greatest_n >= DECELERATION_MIN_MPS2 * self.mass_kg;
+        require(is_brake, "brake_effort", greatest_n)?;
         let is_possible = self.adhesion != RailAdhesion::Unlimited
             || greatest_n <= DECELERATION_MAX_MPS2 * self.mass_kg;
         require(is_possible, "mass_kg", self.mass_kg)

@@ -7,7 +7,7 @@ use dynocar_analysis::explain::answer::{ExplainAnswer, ParameterValue, Verdict};
 use dynocar_analysis::explain::explain;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::write_dataset;
-use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, TrainType, simulate};
+use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, TrainType, TrueEffect, simulate};
 use toml::{Table, Value};
 
 /// A train type with stops on the way, and a seed.
@@ -130,6 +130,19 @@ fn an_unweighed_load_between_tare_and_full_is_no_effect_and_hides_no_weak_brake(
         declare_a_range(folder.path());
         let unweighed = gain(&answer(folder.path()));
         assert!((unweighed - weighed).abs() < 0.03, "{train:?}: {unweighed} for {weighed}");
+    }
+}
+
+#[test]
+fn a_brake_a_little_off_is_no_other_mass_with_another_scale_of_the_traction() {
+    for train in TRAINS {
+        for gain in [0.97, 1.03] {
+            let folder = tempfile::tempdir().unwrap();
+            let brake = TrueEffect::BrakeGain { gain };
+            write_with(train, EffectRequest::Exactly(vec![brake]), folder.path());
+            let answer = answer(folder.path());
+            assert!(answer.effects.is_empty(), "{train:?}, {gain}: {}", answer.statement);
+        }
     }
 }
 

@@ -32,7 +32,7 @@ pub struct HealthArguments {
 ///
 /// The worst verdict of all trains unless it is ok; an unusable configuration or directory.
 pub fn execute(arguments: &HealthArguments) -> Result<(), Failure> {
-    let config = arguments.config.as_deref().map(DaemonConfig::load).transpose()?;
+    let config = arguments.config.as_deref().map(DaemonConfig::load_to_observe).transpose()?;
     if let (Some(train), Some(config)) = (arguments.train, &config)
         && !config.trains.iter().any(|it| it.id == TrainId(train))
     {
@@ -68,6 +68,9 @@ pub fn execute(arguments: &HealthArguments) -> Result<(), Failure> {
 fn lines_of(health: &TrainHealth) -> String {
     let daemon = health.daemon.as_deref().unwrap_or("nobody serves it");
     let mut text = format!("train {}: {}: {daemon}\n", health.train, health.verdict.name());
+    if !health.pipelines.is_empty() {
+        text += &format!("  samples: {}\n", health.samples_in_words());
+    }
     for it in &health.pipelines {
         let (kind, words, age_ms) = (it.kind, it.in_words(), it.age_ms);
         text += &format!("  pipeline {} ({kind}): {words}; vouched {age_ms} ms ago", it.index);

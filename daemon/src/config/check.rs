@@ -77,6 +77,17 @@ impl DaemonConfig {
         DaemonConfig::from_text(path, &text)
     }
 
+    /// Reads the configuration of a daemon that is to be observed: the directories that it alone uses are not looked for.
+    ///
+    /// # Errors
+    ///
+    /// See [`ConfigError`].
+    pub fn load_to_observe(path: &Path) -> Result<Self, ConfigError> {
+        let text = read_text(path)
+            .map_err(|problem| ConfigError::Unreadable { path: path.into(), problem })?;
+        check(&Checker { path, text: &text, is_observer: true })
+    }
+
     /// Returns the diagnostics of the declared trains and their lines, with each train.
     pub fn diagnostics(&self) -> Vec<(TrainId, DatasetDiagnostic)> {
         let found = |train: &TrainConfig| diagnostics(&train.model, train.track.as_deref(), []);
@@ -91,7 +102,7 @@ impl DaemonConfig {
     ///
     /// See [`ConfigError`].
     pub fn from_text(path: &Path, text: &str) -> Result<Self, ConfigError> {
-        check(path, text)
+        check(&Checker { path, text, is_observer: false })
     }
 }
 
@@ -105,24 +116,24 @@ const USUAL_CANDIDATES_MAX: u64 = 2;
 /// The most pipeline threads that one sample channel serves.
 const THREADS_MAX: usize = 10;
 
-/// Checks a configuration's text; `path` is the file it came from.
-pub fn check(path: &Path, text: &str) -> Result<DaemonConfig, ConfigError> {
-    let checker = Checker { path, text };
+/// Checks the text of a configuration.
+fn check(checker: &Checker) -> Result<DaemonConfig, ConfigError> {
+    let Checker { path, text, .. } = *checker;
     let raw: RawConfig = toml::from_str(text).map_err(|error| checker.malformed("", &error))?;
     let (mut trains, named): (Vec<_>, Vec<_>) =
-        check_trains(&checker, raw.trains)?.into_iter().unzip();
+        check_trains(checker, raw.trains)?.into_iter().unzip();
     let process = ProcessConfig { file: path.into(), ..raw.daemon };
     process.check_root()?;
     if process.log_filter().is_none() {
         let allowed = "a level from off to trace, or levels by module, as dynocar=debug";
         return checker.refuse("daemon.log", format!("{:?}", process.log), allowed);
     }
-    let mut threads = check_threads(&checker, raw.threads, process.idle)?;
-    let pipelines = check_pipelines(&checker, raw.pipelines, &trains, &mut threads, process.idle)?;
+    let mut threads = check_threads(checker, raw.threads, process.idle)?;
+    let pipelines = check_pipelines(checker, raw.pipelines, &trains, &mut threads, process.idle)?;
     for (train, named) in trains.iter_mut().zip(&named) {
-        train.answers = Answers::settle(&checker, train.id, named, &raw.quantities, &pipelines)?;
+        train.answers = Answers::settle(checker, train.id, named, &raw.quantities, &pipelines)?;
     }
-    apart::keep_slow_apart(&checker, &pipelines, &threads)?;
+    apart::keep_slow_apart(checker, &pipelines, &threads)?;
     let in_use: HashSet<usize> = pipelines.iter().map(|pipeline| pipeline.thread).collect();
     if let Some(unused) = (0..threads.len()).find(|thread| !in_use.contains(thread)) {
         return checker.refuse("threads.name", &threads[unused].name, "a thread of a pipeline");
@@ -131,7 +142,7 @@ pub fn check(path: &Path, text: &str) -> Result<DaemonConfig, ConfigError> {
         let allowed = format!("at most {THREADS_MAX} threads; let pipelines share one");
         return checker.refuse("threads", threads.len(), allowed);
     }
-    let models = raw.models.map(|it| check_models(&checker, it)).transpose()?;
+    let models = raw.models.map(|it| check_models(checker, it)).transpose()?;
     if models.is_none() && trains.iter().any(|train| train.candidates.is_some()) {
         return checker.refuse("trains.candidates", "models", "a store of models, [models]");
     }
@@ -144,8 +155,8 @@ pub fn check(path: &Path, text: &str) -> Result<DaemonConfig, ConfigError> {
     checker.range("daemon.heartbeat_ms", process.heartbeat_ms, 5, 100)?;
     Ok(DaemonConfig {
         process,
-        metrics: raw.metrics.map(|metrics| check_metrics(&checker, metrics)).transpose()?,
-        state: check_state(&checker, raw.state)?,
+        metrics: raw.metrics.map(|metrics| check_metrics(checker, metrics)).transpose()?,
+        state: check_state(checker, raw.state)?,
         models,
         trains,
         threads,
@@ -174,17 +185,6 @@ fn check_state(
     checker.range("state.interval_s", state.interval_s, 1, 3_600)?;
     checker.range("state.age_max_h", state.age_max_h, 1, 10_000)?;
     Ok(state.keep.then_some(state))
-}
-
-/// Checks that this machine has a processor core.
-fn check_core(checker: &Checker, key: &str, core: Option<usize>) -> Result<(), ConfigError> {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    match core.filter(|&core| core >= cores) {
-        Some(core) => {
-            checker.refuse(key, core, format!("a core of this machine, 0 to {}", cores - 1))
-        }
-        None => Ok(()),
-    }
 }
 
 /// Checks the trains; which pipelines answer for them is known only with the pipelines.
@@ -229,7 +229,7 @@ fn check_threads(
     let mut names = HashSet::new();
     raw.into_iter()
         .map(|thread| {
-            check_core(checker, "threads.core", thread.core)?;
+            checker.core("threads.core", thread.core)?;
             if !names.insert(thread.name.clone()) {
                 return checker.refuse("threads.name", thread.name, "a name of its own");
             }
@@ -369,7 +369,7 @@ fn check_models(checker: &Checker, raw: RawModels) -> Result<ModelsConfig, Confi
             return checker.refuse(key, given, "the least value, then the greatest");
         }
     }
-    check_core(checker, "models.core", raw.core)?;
+    checker.core("models.core", raw.core)?;
     let candidates_max = raw.candidates_max.unwrap_or(USUAL_CANDIDATES_MAX);
     let interval_s = raw.interval_s.unwrap_or(USUAL_INTERVAL_S);
     let RawModels { adopt, core, bounds, .. } = raw;

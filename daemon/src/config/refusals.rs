@@ -66,6 +66,8 @@ pub enum RootError {
 pub struct Checker<'a> {
     pub path: &'a Path,
     pub text: &'a str,
+    /// Whether the configuration is read to observe its daemon: directories that only the daemon uses may be missing.
+    pub is_observer: bool,
 }
 
 impl Checker<'_> {
@@ -118,6 +120,17 @@ impl Checker<'_> {
             return Ok(value);
         }
         self.refuse(key, value, format!("a whole number from {low} to {high}"))
+    }
+
+    /// Checks that this machine has a processor core.
+    pub fn core(&self, key: &str, core: Option<usize>) -> Result<(), ConfigError> {
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        match core.filter(|&core| core >= cores) {
+            Some(core) => {
+                self.refuse(key, core, format!("a core of this machine, 0 to {}", cores - 1))
+            }
+            None => Ok(()),
+        }
     }
 }
 

@@ -25,6 +25,22 @@ pub fn duration(seconds: f64) -> String {
     }
 }
 
+/// Time in s without a sample after which a controller is said to send none.
+pub const SILENT_S: f64 = 5.0;
+
+/// Returns the age of the newest sample, if any has come, and the process of the controller that sends samples.
+pub fn newest_sample_words(age_s: Option<f64>, controller_process: Option<u32>) -> String {
+    let newest = match age_s {
+        None => "none has come yet".to_owned(),
+        Some(age_s) if age_s < SILENT_S => format!("the newest is {} old", duration(age_s)),
+        Some(age_s) => format!("none for {}", duration(age_s)),
+    };
+    match controller_process {
+        Some(process) => format!("{newest}; controller: process {process}"),
+        None => format!("{newest}; no controller is there"),
+    }
+}
+
 /// Why samples were refused and how many, the most frequent first.
 pub fn refusals(counts: &[u32; REJECTION_REASONS]) -> Vec<(RejectionReason, u32)> {
     let of = |&reason: &RejectionReason| (reason, counts[reason as usize]);
@@ -107,6 +123,15 @@ mod tests {
     fn durations_are_said_as_people_say_them() {
         let all = [0.04, 45.0, 600.0, 9000.0, 864_000.0].map(duration);
         assert_eq!(all, ["0.0 s", "45 s", "10 min", "2 h", "10 days"]);
+    }
+
+    #[test]
+    fn a_controller_that_is_gone_or_silent_is_named() {
+        let words = newest_sample_words;
+        assert_eq!(words(Some(0.1), Some(7)), "the newest is 0.1 s old; controller: process 7");
+        assert_eq!(words(Some(34.0), Some(7)), "none for 34 s; controller: process 7");
+        assert_eq!(words(Some(34.0), None), "none for 34 s; no controller is there");
+        assert_eq!(words(None, None), "none has come yet; no controller is there");
     }
 
     #[test]

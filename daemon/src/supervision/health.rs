@@ -9,8 +9,8 @@ use dynocar_shared::vocabulary::KindRow;
 use dynocar_shared::{PipelineKind, Quantity, Reason, RejectionReason, Status, TrainId, UseState};
 use dynocar_transport::{ChannelError, Host, Peer, Role, monotonic_now_ns};
 
-use crate::observing::ObservedTrain;
-use crate::operator::{Suspicion, refusals};
+use crate::observing::{ObservedTrain, sample_age_s};
+use crate::operator::{SILENT_S, Suspicion, newest_sample_words, refusals};
 
 /// How long to wait for a first snapshot; a daemon vouches for its snapshots every 0.1 s.
 const PATIENCE: Duration = Duration::from_millis(1_500);
@@ -86,6 +86,8 @@ pub struct PipelineHealth {
     pub age_ms: i64,
     /// True when that is too long ago.
     pub is_stale: bool,
+    /// Since the newest sample was published, in s; `None` before the first.
+    pub sample_age_s: Option<f64>,
     /// Suspicion of the pipeline.
     pub suspicion: Option<Suspicion>,
     /// Why it refused samples, the most frequent first.
@@ -141,6 +143,8 @@ pub struct TrainHealth {
     pub verdict: Verdict,
     /// Statement of the daemon about itself.
     pub daemon: Option<String>,
+    /// The process of the train's controller; `None` without one.
+    pub controller_process: Option<u32>,
     /// Its pipelines.
     pub pipelines: Vec<PipelineHealth>,
 }
@@ -149,9 +153,26 @@ impl TrainHealth {
     /// Returns the remedy, in one plain line.
     pub fn remedy(&self) -> &'static str {
         match self.verdict {
+            Verdict::Ok if !self.has_samples() => {
+                "the daemon waits for samples: does the controller run, under this train's number?"
+            }
             Verdict::Degraded => self.remedy_of_pipelines(),
             verdict => verdict.remedy(),
         }
+    }
+
+    /// Since the newest sample of all pipelines was published, in s; `None` before the first.
+    fn sample_age_s(&self) -> Option<f64> {
+        self.pipelines.iter().filter_map(|it| it.sample_age_s).reduce(f64::min)
+    }
+
+    fn has_samples(&self) -> bool {
+        self.sample_age_s().is_some_and(|age_s| age_s < SILENT_S)
+    }
+
+    /// Returns the age of the newest sample, and who sends samples.
+    pub fn samples_in_words(&self) -> String {
+        newest_sample_words(self.sample_age_s(), self.controller_process)
     }
 
     /// Samples that cannot be true come first: a suspect may follow from them. A suspect says more than that the model lacks
@@ -197,12 +218,16 @@ pub fn look_at(host: &Host, train: TrainId) -> Result<TrainHealth, ChannelError>
         }
         Peer::Compatible(peer) => (Verdict::Ok, Some(peer.to_string())),
     };
-    if verdict != Verdict::Ok {
-        return Ok(TrainHealth { train, verdict, daemon, pipelines: Vec::new() });
-    }
-    let pipelines = pipelines_of(&mut ObservedTrain::open(host, train)?);
-    let verdict = verdict_of(&pipelines);
-    Ok(TrainHealth { train, verdict, daemon, pipelines })
+    let controller_process = match Peer::look_up(host, train, Role::Controller)? {
+        Peer::Compatible(peer) | Peer::Incompatible(peer) => Some(peer.process_id),
+        Peer::Absent => None,
+    };
+    let pipelines = match verdict {
+        Verdict::Ok => pipelines_of(&mut ObservedTrain::open(host, train)?),
+        _ => Vec::new(),
+    };
+    let verdict = if verdict == Verdict::Ok { verdict_of(&pipelines) } else { verdict };
+    Ok(TrainHealth { train, verdict, daemon, controller_process, pipelines })
 }
 
 /// Returns the pipelines that speak up within [`PATIENCE`]; all of them do within a heartbeat.
@@ -221,6 +246,7 @@ fn pipelines_of(observed: &mut ObservedTrain) -> Vec<PipelineHealth> {
         }
         std::thread::sleep(Duration::from_millis(5));
     }
+    let now_ns = monotonic_now_ns();
     let of_reading = |reading: Reading<'_>| PipelineHealth {
         index: reading.snapshot.pipeline_index,
         kind: reading.snapshot.pipeline_kind().map_or("unknown", PipelineKind::name),
@@ -236,10 +262,11 @@ fn pipelines_of(observed: &mut ObservedTrain) -> Vec<PipelineHealth> {
             .collect(),
         age_ms: reading.age_ns / 1_000_000,
         is_stale: reading.is_stale,
+        sample_age_s: sample_age_s(reading.snapshot, now_ns),
         suspicion: Suspicion::from_snapshot(reading.snapshot),
         refused: refusals(&reading.snapshot.rejected_by_reason),
     };
-    observed.readings(monotonic_now_ns()).map(of_reading).collect()
+    observed.readings(now_ns).map(of_reading).collect()
 }
 
 #[cfg(test)]
@@ -292,6 +319,7 @@ mod tests {
             uses: Vec::new(),
             age_ms: 0,
             is_stale: false,
+            sample_age_s: Some(0.02),
             suspicion: None,
             refused: Vec::new(),
         }
@@ -325,8 +353,9 @@ mod tests {
     #[test]
     fn what_to_do_follows_what_is_known_best() {
         let train = |verdict, pipelines| {
-            let health = TrainHealth { train: TrainId(1), verdict, daemon: None, pipelines };
-            health.remedy()
+            let (daemon, controller_process) = (None, Some(7));
+            let train = TrainId(1);
+            TrainHealth { train, verdict, daemon, controller_process, pipelines }.remedy()
         };
         let mut snapshot = dynocar_shared::ParameterSnapshot::empty();
         snapshot.suspected_effect = EffectKind::DraggingBrake as u32;
@@ -353,6 +382,8 @@ mod tests {
         let starved =
             PipelineHealth { status: Status::Unestimated, ..pipeline(Reason::MissingQuantity) };
         assert!(degraded(vec![starved]).contains("send what the pipeline needs"));
+        let parked = PipelineHealth { sample_age_s: Some(34.0), ..large.clone() };
+        assert!(train(Verdict::Ok, vec![parked]).contains("does the controller run"));
         assert_eq!(train(Verdict::Ok, vec![large]), "nothing");
         assert!(train(Verdict::NoDaemon, vec![]).contains("dynocar run"));
     }

@@ -12,7 +12,7 @@ use prometheus_client::registry::Registry;
 use std::sync::atomic::AtomicU64;
 
 use super::health::Verdict;
-use crate::observing::ObservedTrain;
+use crate::observing::{ObservedTrain, sample_age_s};
 use crate::operator::Suspicion;
 use crate::shadow::{Pinned, TrialFigures};
 
@@ -55,6 +55,7 @@ families! {
         usable = "quantity_usable" "1 while a controller may use the quantity that the pipeline answers";
         use_state = "quantity_use" "1 for the state of use that holds, and why";
         vouched_age = "vouched_age_seconds" "Time since the snapshot was vouched for";
+        sample_age = "sample_age_seconds" "Time since the newest sample was published; grows while the controller sends none";
         latency = "latency_seconds" "From sample to snapshot, the newest";
         value = "parameter_value" "Value in the parameter's unit";
         deviation = "parameter_std" "Standard deviation in the parameter's unit";
@@ -122,7 +123,9 @@ impl Families {
             self.use_state.get_or_create(&labels).set(1.0);
         }
         self.vouched_age.get_or_create(&labels).set(reading.age_ns as f64 * 1e-9);
-        if it.sample_sequence > 0 {
+        let now_ns = it.vouched_ns.saturating_add(reading.age_ns);
+        if let Some(age_s) = sample_age_s(it, now_ns) {
+            self.sample_age.get_or_create(&labels).set(age_s);
             let latency_ns = it.published_ns.saturating_sub(it.sample_published_ns);
             self.latency.get_or_create(&labels).set(latency_ns as f64 * 1e-9);
         }

@@ -4,6 +4,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+use dynocar::observing::sample_age_s;
 use dynocar_analysis::advice::noise::{NoiseSeen, davis_of};
 use dynocar_analysis::advice::{for_mass, for_resistance, in_words, remedy};
 use dynocar_client::Reading;
@@ -57,12 +58,11 @@ impl PipelineState {
         now_ns: i64,
     ) -> Self {
         let snapshot = *reading.snapshot;
-        let age_ns = now_ns.saturating_sub(snapshot.sample_published_ns);
         PipelineState {
             name: name.unwrap_or_else(|| kind_of(&snapshot).to_owned()),
             status: reading.status(),
             reason: reading.reason(),
-            sample_age_s: (snapshot.sample_sequence > 0).then_some(1e-9 * age_ns.max(0) as f64),
+            sample_age_s: sample_age_s(&snapshot, now_ns),
             snapshot,
             history,
         }

@@ -1,6 +1,6 @@
 //! Numbers with intervals and units, and sentences on a train, for screen and lines alike.
 
-use dynocar::operator::{Suspicion, duration, force_words, refusals};
+use dynocar::operator::{SILENT_S, Suspicion, duration, force_words, refusals};
 use dynocar_shared::schema::unit_of;
 use dynocar_shared::{HALF_95, Parameter, Quantity, UseState};
 
@@ -127,11 +127,16 @@ pub fn samples(train: &TrainState) -> String {
     let rejected = sum(|it| it.snapshot.samples_rejected);
     let lost = sum(|it| it.snapshot.samples_lost);
     let rate = train.pipelines.iter().filter_map(|it| it.history.rate_hz()).reduce(f64::max);
-    let rate = rate.map_or("…".to_owned(), |rate| format!("{rate:.1}"));
+    let newest_s = train.pipelines.iter().filter_map(|it| it.sample_age_s).reduce(f64::min);
+    let rate = match (newest_s, rate) {
+        (Some(age_s), _) if age_s > SILENT_S => format!("no sample for {}", duration(age_s)),
+        (_, Some(rate)) => format!("{rate:.1} samples/s"),
+        (_, None) => "… samples/s".to_owned(),
+    };
     let most = train.pipelines.iter().max_by_key(|it| it.snapshot.samples_rejected);
     let why = most.and_then(|it| refusals(&it.snapshot.rejected_by_reason).into_iter().next());
     let why = why.map_or(String::new(), |(reason, _)| format!(" (most: {reason})"));
-    format!("{rate} samples/s, used {used}, rejected {rejected}{why}, lost {lost}")
+    format!("{rate}, used {used}, rejected {rejected}{why}, lost {lost}")
 }
 
 /// Returns the unexplained force with its interval, and the suspect with its alternatives.

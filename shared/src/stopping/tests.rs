@@ -156,6 +156,10 @@ fn bad_input_is_named() {
     // The adhesion limits the deceleration of a brake of any force.
     let carried = RailAdhesion::Coefficient(Uncertain::exact(0.1));
     assert!(Stop { adhesion: carried, ..in_t }.estimate(0.95).is_ok());
+    let percent = RailAdhesion::Coefficient(Uncertain::exact(15.0));
+    assert_eq!(named(Stop { adhesion: percent, ..good }), "adhesion");
+    let in_kn = constant(100.0);
+    assert_eq!(named(Stop { brake_effort: &in_kn, ..good }), "brake_effort");
     assert_eq!(named(Stop { brake_effort: &[], ..good }), "brake_effort");
     assert_eq!(named(Stop { brake_scale: Uncertain::new(1.0, f64::NAN), ..good }), "brake_scale");
     let backwards = [effort[0], EffortPoint { speed_mps: -1.0, force_n: 0.0 }];

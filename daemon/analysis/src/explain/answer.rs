@@ -160,8 +160,9 @@ pub struct Course {
 }
 
 impl Course {
-    /// Returns the course as a sentence, with the advice that follows from it.
-    pub fn sentence(&self, kind: &str) -> String {
+    /// Returns the course as a sentence, with the advice that follows from it; `is_named` where the answer states a mean
+    /// of the number.
+    pub fn sentence(&self, kind: &str, is_named: bool) -> String {
         let (words, unit) = parameter(self.parameter);
         let shown = |part: &CoursePart| {
             let runs = match part.first_run == part.last_run {
@@ -173,12 +174,11 @@ impl Course {
             format!("{value} ± {half} {unit}").trim_end().to_owned() + &format!(" in {runs}")
         };
         let parts: Vec<String> = self.parts.iter().map(shown).collect();
-        format!(
-            "Over the runs {} changes: {words} {}. The stated value is a mean that holds for no run: \
-             explain the newest runs by themselves to learn what holds now.",
-            kind_name(kind),
-            parts.join(", ")
-        )
+        let (name, parts) = (kind_name(kind), parts.join(", "));
+        let mean =
+            if is_named { "The stated value is a mean that holds for no run: e" } else { "E" };
+        let advice = "xplain the newest runs by themselves to learn what holds now.";
+        format!("Over the runs {name} changes: {words} {parts}. {mean}{advice}")
     }
 }
 
@@ -387,6 +387,9 @@ pub struct ExplainAnswer {
     /// Standard deviation in N/kN of the unexplained force, averaged over a minute; absent without motion.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unexplained_n_per_kn: Option<f64>,
+    /// Numbers that change over the runs although no effect of their kind is named, by kind; absent without any.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub over_time: BTreeMap<&'static str, Vec<Course>>,
     /// Other explanations that were considered.
     pub considered: Vec<Considered>,
     /// Information of the data on the numbers of train and line that were not found.

@@ -5,6 +5,8 @@
 //! finished model at no effect. The information matrix then gives the standard deviation of its number, and shows
 //! whether the kind is distinguishable from each of the others.
 
+use std::collections::BTreeMap;
+
 use dynocar_model::words::{kind_name, number, parameter};
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::{EffectKind, KindRow};
@@ -38,6 +40,13 @@ impl FinishedFit<'_> {
         let own = self.courses.iter().filter(|it| it.0 == kind);
         own.flat_map(|it| it.1.clone()).collect()
     }
+
+    /// Returns the courses of kinds that are not among the named effects, by kind.
+    pub fn unnamed_courses(&self, effects: &[EffectAnswer]) -> BTreeMap<&'static str, Vec<Course>> {
+        let is_named = |kind: EffectKind| effects.iter().any(|it| it.kind == kind.name());
+        let unnamed = self.courses.iter().filter(|it| !is_named(it.0));
+        unnamed.map(|(kind, all)| (kind.name(), all.clone())).collect()
+    }
 }
 
 /// Returns the limits of a verdict.
@@ -53,7 +62,8 @@ pub fn caveats(
     let mut caveats: Vec<String> = contradictions.map(|it| format!(" {it}")).collect();
     caveats.dedup();
     let courses = known.courses.iter().flat_map(|(kind, all)| {
-        all.iter().map(|course| format!(" {}", course.sentence(kind.name())))
+        let is_named = effects.iter().any(|effect| effect.kind == kind.name());
+        all.iter().map(move |course| format!(" {}", course.sentence(kind.name(), is_named)))
     });
     caveats.extend(courses);
     caveats.extend(effects.iter().filter_map(by_held_out_runs));

@@ -76,6 +76,7 @@ pub fn answer(
         words,
         caveats: trimmed(&caveats),
         diagnostics,
+        over_time: if is_told { known.unnamed_courses(&effects) } else { BTreeMap::new() },
         effects,
         ambiguous_with: kinds_of(&competing),
         experiment,

@@ -12,7 +12,8 @@ const UNIT_TOLERANCE: f64 = 0.2;
 /// Forces that are wrong by no more than this factor may as well be right and the mass wrong, as that of one car is.
 const MASS_FACTOR_MAX: f64 = 8.0;
 
-/// Recorded over true speed below which the speed stands at 0: of two units of time one is 1e-9 of the other at most.
+/// Recorded over true speed below which the speed stands at 0, or distance by position over that by speed below which
+/// the position stands still: of two units of time one is 1e-9 of the other at most.
 pub(super) const STUCK_FACTOR: f64 = 1e-10;
 
 /// How much a note matters.
@@ -170,6 +171,11 @@ impl DetectedFault {
             }
             InputFault::SpeedScale => {
                 format!("speeds look {size} by position or acceleration")
+            }
+            InputFault::PositionScale if high < STUCK_FACTOR => {
+                return "the position stands still while the train moves: is its sensor or column \
+                        right?"
+                    .into();
             }
             InputFault::PositionScale => format!("positions look {size} by the speed"),
             InputFault::DirectionReversed => {

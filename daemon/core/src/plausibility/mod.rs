@@ -134,6 +134,9 @@ fn kinematic(figures: &Figures) -> Option<DetectedFault> {
     if factor < STUCK_FACTOR {
         return Some(DetectedFault { fault: InputFault::SpeedScale, factor });
     }
+    if ratio.abs() < STUCK_FACTOR {
+        return Some(DetectedFault { fault: InputFault::PositionScale, factor: ratio.abs() });
+    }
     if !(ratio > 0.0) || !is_outside(ratio, DISTANCE_RATIOS) {
         return None;
     }

@@ -57,7 +57,12 @@ impl ForceBalance {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
+    use dynocar_shared::{SampleField, TrainId, TrainSample};
+
     use super::*;
+    use crate::train::{Davis, FrictionBrake};
 
     #[test]
     fn forces_balance_inertia() {
@@ -77,5 +82,26 @@ mod tests {
         let on_a_unit_more = ForceBalance { gradient_permille: 6.0, ..acting };
         let taken_mps2 = p0 - on_a_unit_more.acceleration_mps2()[0];
         assert!((taken_mps2 - mps2_per_n_per_kn(0.06)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_brake_force_that_no_sample_carries_is_the_one_that_its_pressure_exerts() {
+        let mut train = TrainModel::bare("", 1e5, Davis { a: 1.0, b: 0.0, c: 0.0 });
+        let known = FrictionBrake { force_per_pressure_n_per_pa: 0.25, release_pressure_pa: 2e4 };
+        let mut brake_n = |friction_brake, reported: &[(SampleField, f64)]| {
+            train.brake_gear.friction_brake = friction_brake;
+            let mut sample = TrainSample::empty(TrainId(1));
+            for &(field, value) in reported {
+                sample = sample.with(field, value);
+            }
+            let valid = ValidSample { sample: &sample, step_s: 0.0, segment: 1 };
+            ForceResolver::new(Arc::new(train.clone()), None).resolve(&valid).brake_force_n
+        };
+        let pressure = (SampleField::BrakeCylinderPressure, 1.2e5);
+        assert_eq!(brake_n(Some(known), &[pressure]), Some(25e3));
+        assert_eq!(brake_n(Some(known), &[]), None);
+        assert_eq!(brake_n(None, &[pressure]), None);
+        let reported = (SampleField::BrakeForce, 40e3);
+        assert_eq!(brake_n(Some(known), &[pressure, reported]), Some(40e3), "the whole force");
     }
 }

@@ -223,7 +223,8 @@ impl ForceResolver {
 
     /// Returns the known forces at a sample.
     ///
-    /// The gradient is the track's at the train's position, else the sample's own, else the
+    /// The brake force is the sample's own, else the one that the friction brake makes of its pressure where that is
+    /// declared. The gradient is the track's at the train's position, else the sample's own, else the
     /// accelerometer's specific force minus dv/dt over the last step, else unknown.
     ///
     /// # Real-time
@@ -254,7 +255,11 @@ impl ForceResolver {
         });
         let tunnel_share = on_track(Track::tunnel_share);
         let traction_n = sample.get(SampleField::TractionForce);
-        let brake_n = sample.get(SampleField::BrakeForce);
+        let by_pressure_n = || {
+            let friction_brake = train.brake_gear.friction_brake?;
+            Some(friction_brake.force_n(sample.get(SampleField::BrakeCylinderPressure)?))
+        };
+        let brake_n = sample.get(SampleField::BrakeForce).or_else(by_pressure_n);
         let degc = sample.get(SampleField::AmbientTemperature).or(self.ambient_temperature_degc);
         self.ambient_temperature_degc = degc;
         self.last = Some((valid.segment, sample.speed_mps));

@@ -9,6 +9,9 @@ pub use crate::train::numbers::BRAKE_GAIN as GAIN;
 /// A brake whose force is nearer to its report is as good as declared.
 pub const GAIN_LEAST: f64 = adhesion::DECLARED_BRAKE_STD;
 
+/// Standard deviation of the scale of a reported brake force, from train to train.
+pub const USUAL_STD: f64 = 0.02;
+
 /// The force builds up over this time in s.
 pub const BUILD_UP_S: f64 = 10.0;
 /// The dragging force.

@@ -13,6 +13,8 @@ pub const PARAMETER: Parameter = Parameter::new("mass_factor", (0.4, 2.5), 0.005
 pub const LEAST_SHARE: f64 = 0.012;
 /// Standard deviation of a mass that was weighed, or declared for a run, as a share of it.
 pub const WEIGHED_STD: f64 = 0.03;
+/// The same from run to run on one line, where each run declares its load.
+pub const USUAL_STD: f64 = 0.02;
 
 /// Unit: the share of the mass that is added.
 pub const SUSPECT: Suspect = Suspect {

@@ -23,9 +23,14 @@ pub const OF_TRACTION: Policy = Policy {
     frees: &[DeclaredFigure::Traction],
     ..Policy::USUAL
 };
-/// The usual errors contain a scale of the brake, and a larger one is no small error.
-pub const OF_BRAKE: Policy =
-    Policy { is_sought_with_nuisance: false, frees: &[DeclaredFigure::Brake], ..Policy::USUAL };
+/// A brake is everyday some per cent weaker or stronger than reported. Another mass with another scale of the traction
+/// looks the same.
+pub const OF_BRAKE: Policy = Policy {
+    is_sought_with_nuisance: false,
+    everyday: Some(Everyday { rank: 3, most: f64::INFINITY }),
+    frees: &[DeclaredFigure::Brake],
+    ..Policy::USUAL
+};
 
 /// Proposes a gain of the traction force.
 pub fn of_traction(scan: &Scan) -> Proposal {

@@ -3,7 +3,9 @@
 //! a finished model include them.
 
 use dynocar_model::terms::extra::Covariate;
-use dynocar_model::terms::{Parameter, bearings, curve, delay, gradient, rotating, traction};
+use dynocar_model::terms::{
+    Parameter, bearings, brake, curve, delay, gradient, rotating, traction,
+};
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{DMatrix, DVector};
 
@@ -16,7 +18,7 @@ use crate::explain::evidence::{RunData, SampleForces};
 /// Figures that are usually a little wrong, with the standard deviations of their errors.
 const FIGURES: [(DeclaredFigure, f64); 7] = [
     (DeclaredFigure::Traction, traction::USUAL_STD),
-    (DeclaredFigure::Brake, traction::USUAL_STD),
+    (DeclaredFigure::Brake, brake::USUAL_STD),
     (DeclaredFigure::Lateness, delay::USUAL_STD_S),
     (DeclaredFigure::Curves, curve::USUAL_STD),
     (DeclaredFigure::Warming, bearings::USUAL_STD),

@@ -197,6 +197,7 @@ mod tests {
             fit_runs: None,
             drive: None,
             force_late_s: None,
+            over_time: std::collections::BTreeMap::new(),
             unexplained_n_per_kn: None,
             considered: Vec::new(),
             identifiability: Vec::new(),

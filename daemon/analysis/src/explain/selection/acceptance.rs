@@ -151,9 +151,8 @@ fn stds_from_none(fit: &Fit, index: usize) -> f64 {
     let range = fit.model.ranges()[index].clone();
     let deviations = deviations(fit);
     if effect.kind() == EffectKind::BrakeDelay {
-        let own =
-            deviations.covariance.view((range.start, range.start), (range.len(), range.len()));
-        return (parameters.iter().sum::<f64>() - delay::LEAST_S) / own.sum().max(0.0).sqrt();
+        let beyond_s = parameters.iter().sum::<f64>() - delay::LEAST_S;
+        return beyond_s / deviations.std_of_sum(range);
     }
     effect.size(parameters).abs() / deviations.std[range.start]
 }

@@ -1,6 +1,8 @@
 //! How surely the parameters of a fitted model are known, with the run as the unit of evidence; and by how much they can
 //! be wrong in any number of runs.
 
+use std::ops::Range;
+
 use dynocar_model::train::Davis;
 use dynocar_shared::HALF_95;
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
@@ -106,6 +108,12 @@ pub struct Deviations {
 }
 
 impl Deviations {
+    /// Returns the standard deviation of the sum of some parameters.
+    pub fn std_of_sum(&self, of: Range<usize>) -> f64 {
+        let own = self.covariance.view((of.start, of.start), (of.len(), of.len()));
+        own.sum().max(0.0).sqrt()
+    }
+
     /// Adds the errors that runs with samples some s apart share, so that more of them do not take these away: of the
     /// form of a, b and c, and of the unknown course between samples. `theta` begins with a, b and c.
     pub fn add_shared_errors(

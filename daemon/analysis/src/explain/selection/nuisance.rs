@@ -181,9 +181,8 @@ impl Search<'_> {
     }
 
     /// Drops an effect that does not stand jointly with the usual errors: a force outside the library that explains no
-    /// more than chance there, an effect of the library that runs to a bound of its range there, a load whose change may
-    /// be none there, a force or speed no later there than is usual, and an effect that was certain until others were
-    /// accepted. Returns false without one.
+    /// more than chance there, an effect of the library that runs to a bound of its range or may be none there, and a force
+    /// or speed no later there than is usual. Returns false without one.
     pub(super) fn drop_fallen(&self, outcome: &mut SearchOutcome) -> bool {
         let joint = self.refit_with_nuisance(outcome);
         let with_usual = &joint.fit;
@@ -201,13 +200,12 @@ impl Search<'_> {
             if outcome.is_certain(kind) && joint.holds_none(index) {
                 return Some((index, Refusal::Chance));
             }
-            let is_load = kind == EffectKind::MassChange;
-            if is_load && joint.holds_none(index) {
+            // The numbers of a profile are no one size.
+            let is_sized = effects[index].parameters().len() <= 2 || kind == EffectKind::MassChange;
+            let is_none = is_sized && kind != EffectKind::Unknown && joint.holds_none(index);
+            if is_none || policy_of(kind).is_late && joint.is_immaterial(index) {
                 let is_small = joint.is_immaterial(index);
                 return Some((index, if is_small { Refusal::Immaterial } else { Refusal::Chance }));
-            }
-            if policy_of(kind).is_late && joint.is_immaterial(index) {
-                return Some((index, Refusal::Immaterial));
             }
             if effects[index].place().windows.is_some() && joint.is_as_loads_are(index) {
                 return Some((index, Refusal::UsualLoads));

@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
+use dynocar_model::terms::masses;
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{Cholesky, DMatrix};
 
 use super::deviations::deviations_with_nuisance;
-use crate::explain::effects::{AtBound, SharedHypothesis};
+use crate::explain::effects::{AtBound, SharedHypothesis, policy_of};
 use crate::explain::evidence::{Fit, acceptance_score};
 use crate::statistics::rms;
 
@@ -78,17 +79,21 @@ impl NuisanceFit {
         fit.theta == from && effects.all(|(one, other)| Arc::ptr_eq(one, other))
     }
 
-    /// Returns whether nothing is left of an effect: the 95 % interval of its size holds zero, and of several masses that
-    /// of each.
+    /// Returns whether nothing is left of an effect: the 95 % interval of its size holds zero, of several masses that of
+    /// each, and of a dead time and a lag, which take each other's place, that of their sum.
     pub(super) fn holds_none(&self, index: usize) -> bool {
         let range = self.fit.model.ranges()[index].clone();
         let effect = &self.fit.model.effects[index];
-        let std = deviations_with_nuisance(&self.fit, range.end, self.shared).std;
+        let deviations = deviations_with_nuisance(&self.fit, range.end, self.shared);
         if effect.kind() == EffectKind::MassChange {
             let away = |i: usize| (self.fit.theta[i] - effect.none()).abs();
-            return range.into_iter().all(|i| away(i) < HALF_95 * std[i]);
+            return range.into_iter().all(|i| away(i) < HALF_95 * deviations.std[i]);
         }
-        effect.size(&self.fit.theta[range.clone()]).abs() < HALF_95 * std[range.start]
+        if policy_of(effect.kind()).is_late {
+            let together_s: f64 = self.fit.theta[range.clone()].iter().sum();
+            return together_s < HALF_95 * deviations.std_of_sum(range);
+        }
+        effect.size(&self.fit.theta[range.clone()]).abs() < HALF_95 * deviations.std[range.start]
     }
 
     /// Returns whether an effect is no larger than the usual errors of declared figures.
@@ -98,7 +103,7 @@ impl NuisanceFit {
     }
 
     /// Returns whether a change of mass in single runs is the usual scatter of loads: the largest of several deviations
-    /// is about √(2 ln n) of their standard deviation, which the other runs show.
+    /// is about √(2 ln n) of their standard deviation, which is the usual one or the larger one that the other runs show.
     pub(super) fn is_as_loads_are(&self, index: usize) -> bool {
         let fit = &self.fit;
         let effect = &fit.model.effects[index];
@@ -107,8 +112,8 @@ impl NuisanceFit {
         }
         let range = fit.model.ranges()[index].clone();
         let std = deviations_with_nuisance(fit, range.end, self.shared).std;
-        let away =
-            range.map(|i| (fit.theta[i] - effect.none()) / std[i].hypot(fit.noise.scatter.force));
+        let scatter = fit.noise.scatter.force.max(masses::USUAL_STD);
+        let away = range.map(|i| (fit.theta[i] - effect.none()) / std[i].hypot(scatter));
         rms(&away.collect::<Vec<_>>()) < (2.0 * (fit.runs.len() as f64).ln()).sqrt()
     }
 }

@@ -124,8 +124,12 @@ impl Search<'_> {
                 fruitless.push(EffectKind::Unknown);
             }
             let trials = self.round(&outcome.fit, &mut outcome.not_testable);
-            let next = self.best(&trials, &fruitless).map(|trial| (trial.kind, trial.fit.clone()));
-            let small = next.is_none().then(|| self.with_certain_and_small(&trials)).flatten();
+            let best = self.best(&trials, &fruitless);
+            let small = match best {
+                None => self.with_certain_and_small(&trials),
+                Some(best) => Self::stronger_and_small(&trials, best),
+            };
+            let next = best.map(|trial| (trial.kind, trial.fit.clone()));
             let round = round_of(trials);
             outcome.rounds.push(round.clone());
             if let Some((kinds, fit)) = small {

@@ -11,7 +11,7 @@ use super::acceptance::{CERTAIN, is_accepted};
 use super::outcome::{EffectTrial, Refusal, SearchOutcome, penalty};
 use super::search::Search;
 use crate::explain::effects::{SharedHypothesis, policy_of};
-use crate::explain::evidence::Fit;
+use crate::explain::evidence::{EQUAL, Fit};
 use crate::explain::score::reduction;
 use crate::statistics::rms;
 
@@ -57,6 +57,18 @@ impl Search<'_> {
         taken
     }
 
+    /// Returns the model with the strongest trial, where that is an everyday kind, certain and only for its size no
+    /// effect: an effect that explains less may be no more than its remainder.
+    pub(super) fn stronger_and_small(
+        trials: &[EffectTrial],
+        best: &EffectTrial,
+    ) -> Option<(Vec<EffectKind>, Fit)> {
+        let strongest = trials.first()?;
+        let is_stronger = strongest.bic_gain > best.bic_gain + EQUAL;
+        (is_stronger && is_certain_and_small(strongest))
+            .then(|| (vec![strongest.kind], strongest.fit.clone()))
+    }
+
     /// Names effects that have turned out to matter jointly with those found. Removes small effects where nothing was
     /// found, and those that are no longer certain jointly with the effects found.
     pub(super) fn finalise_minor_effects(&self, outcome: &mut SearchOutcome) {
@@ -89,8 +101,8 @@ impl Search<'_> {
         }
     }
 
-    /// Returns the everyday scales of which nothing is left jointly with the usual errors: the 95 % interval of their
-    /// size holds zero.
+    /// Returns the everyday scales of which little is left jointly with the usual errors: no more than is usual, or the
+    /// 95 % interval of their size holds zero.
     fn usual_scales(&self, outcome: &mut SearchOutcome) -> Vec<EffectKind> {
         let is_scale = |effect: &SharedHypothesis| {
             policy_of(effect.kind()).everyday.is_some() && effect.parameters().len() == 1
@@ -100,7 +112,8 @@ impl Search<'_> {
         }
         let joint = self.refit_with_nuisance(outcome);
         let scales = outcome.fit.model.effects.iter().enumerate();
-        let usual = scales.filter(|(index, effect)| is_scale(effect) && joint.holds_none(*index));
+        let is_usual = |index| joint.holds_none(index) || joint.is_immaterial(index);
+        let usual = scales.filter(|(index, effect)| is_scale(effect) && is_usual(*index));
         usual.map(|(_, effect)| effect.kind()).collect()
     }
 }
