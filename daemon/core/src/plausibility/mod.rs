@@ -315,6 +315,18 @@ mod tests {
     }
 
     #[test]
+    fn a_position_that_stands_still_is_named_while_the_train_moves() {
+        let slopes = Slopes { traction: Some(1.0), brake: Some(1.0), ..Slopes::default() };
+        for ratio in [0.0, -1e-14] {
+            let still = Figures { distance_ratio: Some(ratio), slopes, ..Figures::default() };
+            let [(InputFault::PositionScale, words)] = &found(still)[..] else {
+                panic!("one fault")
+            };
+            assert!(words.starts_with("the position stands still"), "{words}");
+        }
+    }
+
+    #[test]
     fn a_speed_with_which_the_position_agrees_has_the_right_unit() {
         let slopes = Slopes { traction: Some(3.6), brake: Some(3.6), ..Slopes::default() };
         let alone = Figures { slopes, ..Figures::default() };
