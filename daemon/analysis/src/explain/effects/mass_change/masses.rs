@@ -18,7 +18,7 @@ use crate::explain::places::{Axis, IntervalEnd, Reach, span_m};
 use crate::explain::scan::Scan;
 
 /// Parts in which another mass holds.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Masses {
     parts: Vec<FactorPart>,
     /// For every part, the values where its ends could be; empty where no end was chosen.
@@ -33,13 +33,7 @@ impl Masses {
     /// Returns one part with the values where its ends could be, and twice the logarithm of the number of its
     /// alternatives.
     pub fn new(part: FactorPart, edges: Vec<f64>, choice_cost: f64) -> Self {
-        let mut masses = Masses {
-            parts: Vec::new(),
-            edges: Vec::new(),
-            parameters: Vec::new(),
-            information: None,
-            choice_cost: 0.0,
-        };
+        let mut masses = Masses::default();
         masses.push(part, edges, choice_cost);
         masses
     }

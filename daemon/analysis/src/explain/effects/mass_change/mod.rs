@@ -15,8 +15,10 @@ use crate::explain::scan::{Scan, Tuple};
 use crate::parallel;
 use masses::{Along, FactorPart, Masses, STATION_M, STOP_MIN_S, stations, stops};
 
-/// Greatest number of sections or windows.
+/// Greatest number of sections or windows; runs that have another mass as a whole may be half of all.
 const PARTS_MAX: usize = 5;
+/// Whole runs that explain this share of what the best one does are added with it.
+const WITH_BEST_SHARE: f64 = 0.5;
 /// Own factor of a run, in standard deviations of weighed loads, beyond which it is another mass.
 const BEYOND_LOADS: f64 = 2.0;
 
@@ -170,38 +172,68 @@ fn all_windows(scan: &Scan) -> Vec<(FactorPart, Tuple)> {
     windows
 }
 
-/// Returns whether parts are most runs, each as a whole: those are all runs, or another effect.
-fn has_most_runs(scan: &Scan, parts: &[FactorPart]) -> bool {
-    let is_whole_run = |part: &&FactorPart| {
-        matches!(part.along, Along::Run(..)) && factors_of_whole_runs(scan, part).is_some()
-    };
-    2 * parts.iter().filter(is_whole_run).count() > scan.problem.runs.len()
+/// Returns whether a part is a run from its beginning to its end.
+fn is_whole_run(scan: &Scan, part: &FactorPart) -> bool {
+    matches!(part.along, Along::Run(..)) && factors_of_whole_runs(scan, part).is_some()
 }
 
-/// Adds parts one by one, each fitted with a factor of its own, while they explain something; where no end
-/// of it comes in sight on the line, all of them besides.
+/// A part that may be added: the decrease of the cost, its factor less 1, and where it is.
+type Gain = (f64, f64, FactorPart);
+
+/// Returns the parts of another mass that are worth reporting, the best first.
+fn ranked(scan: &Scan, tuples: impl Iterator<Item = (FactorPart, Tuple)>) -> Vec<Gain> {
+    let gain_of = |(part, tuple): (FactorPart, Tuple)| {
+        let by_scan = scan.gain(&tuple);
+        let of_runs = of_whole_runs(scan, &part).filter(|it| it.0 > by_scan.0);
+        let (gain, estimate) = of_runs.unwrap_or(by_scan);
+        (gain, estimate, part)
+    };
+    let mut gains: Vec<Gain> = tuples.map(gain_of).collect();
+    gains.retain(|(_, estimate, _)| estimate.abs() > LEAST_SHARE);
+    gains.sort_by(|one, other| other.0.total_cmp(&one.0));
+    gains
+}
+
+/// Returns the first of the ranked parts; where it is a whole run, with the others that explain about as much: the
+/// masses of runs do not depend on each other.
+fn leading(scan: &Scan, ranked: Vec<Gain>, count_max: usize) -> Vec<Gain> {
+    let mut leading: Vec<Gain> = Vec::new();
+    for gain in ranked {
+        let is_along = leading.first().is_none_or(|best| {
+            gain.0 >= WITH_BEST_SHARE * best.0
+                && leading.iter().all(|own| own.2.is_apart(&gain.2))
+                && is_whole_run(scan, &best.2)
+                && is_whole_run(scan, &gain.2)
+        });
+        if is_along && leading.len() < count_max {
+            leading.push(gain);
+        }
+    }
+    leading
+}
+
+/// Adds parts, each fitted with a factor of its own, while they explain something; where no end of it comes in sight on
+/// the line, all of them besides.
 fn grow(scan: &Scan, parts: &[(FactorPart, Tuple)]) -> Vec<Candidate> {
     let part_cost = 2.0 * (parts.len().max(2) as f64).ln();
-    let best = |scan: &Scan, tuples: &mut dyn Iterator<Item = (FactorPart, Tuple)>| {
-        tuples
-            .map(|(part, tuple)| {
-                let by_scan = scan.gain(&tuple);
-                let of_runs = of_whole_runs(scan, &part).filter(|it| it.0 > by_scan.0);
-                let (gain, estimate) = of_runs.unwrap_or(by_scan);
-                (gain, estimate, part)
-            })
-            .filter(|(_, estimate, _)| estimate.abs() > LEAST_SHARE)
-            .max_by(|one, other| one.0.total_cmp(&other.0))
-    };
-    let Some((_, estimate, part)) = best(scan, &mut parts.iter().cloned()) else {
-        return Vec::new();
-    };
     let edges = |part: &FactorPart| part.edges(parts.iter().map(|(other, _)| other));
-    let mut masses = Masses::new(part.clone(), edges(&part), part_cost);
-    let mut start = vec![(1.0 + estimate).clamp(0.7, 1.5)];
-    while masses.parts().len() < PARTS_MAX {
-        let hypothesis = Arc::new(masses.clone());
-        let more: [(SharedHypothesis, Vec<f64>); 1] = [(hypothesis, start)];
+    let most_runs = scan.problem.runs.len() / 2 + 1;
+    let mut masses = Masses::default();
+    let mut start: Vec<f64> = Vec::new();
+    let mut found = leading(scan, ranked(scan, parts.iter().cloned()), most_runs);
+    while !found.is_empty() {
+        for (_, estimate, part) in found {
+            let edges = edges(&part);
+            masses.push(part, edges, part_cost);
+            start.push((1.0 + estimate).clamp(0.7, 1.5));
+        }
+        let are_runs = masses.parts().iter().all(|part| is_whole_run(scan, part));
+        let count_max = if are_runs { PARTS_MAX.max(most_runs) } else { PARTS_MAX };
+        let room = count_max.saturating_sub(masses.parts().len());
+        if room == 0 {
+            break;
+        }
+        let more: [(SharedHypothesis, Vec<f64>); 1] = [(Arc::new(masses.clone()), start)];
         let fit = scan.problem.grown(scan.fit, more);
         start = fit.theta[scan.fit.theta.len()..].to_vec();
         let Some(next) = Scan::new(scan.problem, scan.holdout, scan.train, scan.track, &fit) else {
@@ -211,18 +243,13 @@ fn grow(scan: &Scan, parts: &[(FactorPart, Tuple)]) -> Vec<Candidate> {
             let is_free = masses.parts().iter().all(|own| own.is_apart(part));
             is_free.then(|| (part.clone(), part_tuple(&next, part)))
         });
-        match best(&next, &mut fresh.into_iter().flatten()) {
-            Some((gain, estimate, part))
-                if gain > part_cost + EQUAL && estimate.abs() > LEAST_SHARE =>
-            {
-                let edges = edges(&part);
-                masses.push(part, edges, part_cost);
-                start.push((1.0 + estimate).clamp(0.7, 1.5));
-            }
-            _ => break,
-        }
+        let mut gains = ranked(&next, fresh.into_iter().flatten());
+        gains.retain(|(gain, ..)| *gain > part_cost + EQUAL);
+        found = leading(&next, gains, room);
     }
-    if has_most_runs(scan, masses.parts()) {
+    let whole_runs = masses.parts().iter().filter(|part| is_whole_run(scan, part)).count();
+    // Another mass in most runs is one in all of them, or another effect.
+    if masses.parts().is_empty() || 2 * whole_runs > scan.problem.runs.len() {
         return Vec::new();
     }
     let is_everywhere = masses.parts().len() == PARTS_MAX
