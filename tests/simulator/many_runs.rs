@@ -1,7 +1,7 @@
 //! Datasets of many runs: the search holds some of them, with thinned samples, and reads each run once, so that work
 //! and memory grow no faster than the data.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Mutex;
 
 use dynocar_analysis::dataset::{Dataset, Role, Run};
@@ -11,7 +11,9 @@ use dynocar_analysis::explain::many::{Held, Many};
 use dynocar_analysis::explain::{explain, explain_many};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
-use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, simulate};
+use dynocar_tests::simulator::run_maker::RunPlan;
+use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, TrueDeviations, simulate};
+use serde_json::Value;
 
 /// Returns settings for many runs with these kinds of effects.
 fn months_of(seed: u64, kinds: Vec<EffectKind>) -> SimulatorSettings {
@@ -77,6 +79,55 @@ fn runs_held_out_confirm_an_effect_or_say_that_it_is_not_in_them() {
     assert!(held_out.p_value < 1e-6, "{held_out:?}");
     assert!((number(&held_out.parameters, "c_factor") - 1.0).abs() < 0.2 * (truth - 1.0));
     assert!(explained.statement.contains("which is not what the fit runs say"));
+}
+
+#[test]
+fn a_wheel_that_wears_is_shown_over_the_runs_where_its_mean_is_as_declared() {
+    let settings = SimulatorSettings {
+        runs: 24,
+        holdout_runs: 6,
+        ..SimulatorSettings::new(5_330_003, EffectRequest::Kinds(Vec::new()))
+    };
+    let mut dataset = read_files(&dataset_files(&simulate(&settings)));
+    // By 1 % from the first run to the last, about the declared diameter.
+    let scale_of = |run: usize| 0.995 + 0.01 * run as f64 / 23.0;
+    for (index, run) in dataset.runs.iter_mut().enumerate() {
+        for sample in &mut run.samples {
+            sample.speed_mps *= scale_of(index);
+        }
+    }
+    let answer = explain(&dataset, &|_, _| ()).unwrap().answer;
+    assert!(answer.effects.is_empty(), "{}", answer.statement);
+    let changing = "over the runs changes a wrong wheel diameter";
+    assert!(answer.statement.contains(changing), "{}", answer.statement);
+    let parts = &answer.over_time["wheel_diameter"][0].parts;
+    let growth = parts.last().unwrap().value - parts[0].value;
+    assert!((growth - 0.0088).abs() < 0.0015, "{parts:?}");
+}
+
+#[test]
+fn another_mass_in_almost_half_of_many_runs_is_found_in_all_of_them() {
+    let settings = SimulatorSettings {
+        runs: 32,
+        holdout_runs: 8,
+        deviations: TrueDeviations::ROUGH,
+        ..SimulatorSettings::new(5_310_001, EffectRequest::Kinds(vec![EffectKind::MassChange]))
+    };
+    let simulated = simulate(&settings);
+    let answer = explain(&read_files(&dataset_files(&simulated)), &|_, _| ()).unwrap().answer;
+    let written = serde_json::to_value(&answer).unwrap();
+    let of = |values: &Value| -> BTreeSet<String> {
+        let windows = values["windows"].as_array().expect("windows of runs");
+        windows.iter().map(|it| it["run"].as_str().unwrap().to_owned()).collect()
+    };
+    let effects = written["effects"].as_array().unwrap();
+    let own = effects.iter().find(|it| it["kind"] == "mass_change").expect("it is found");
+    let plans = simulated.runs.iter().map(|run| &run.plan);
+    let fitted: BTreeSet<String> = plans.filter(|it| !it.is_holdout).map(RunPlan::file).collect();
+    let changed = of(&simulated.effects[0].parameters(0.0));
+    let expected: BTreeSet<String> = changed.intersection(&fitted).cloned().collect();
+    assert!(expected.len() > 10, "{expected:?}");
+    assert_eq!(of(&own["parameters"]), expected);
 }
 
 #[test]

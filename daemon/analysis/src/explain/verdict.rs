@@ -19,7 +19,7 @@ use super::effects::ReportContext;
 use super::evidence::p_value;
 use super::held_out::HeldOutEffect;
 use super::hypothesis::{Hypothesis, ReportedValues};
-use super::report::effect::{contradicting_scales, located, small, verdict_words};
+use super::report::effect::{changing, contradicting_scales, located, small, verdict_words};
 use super::score::{self, PredictionScore};
 use super::selection::{
     Deviations, ScaleSources, Search, SearchOutcome, deciding_score, discounted, few_runs_factor,
@@ -66,6 +66,10 @@ pub fn answer(
     let is_told = words.is_none() && is_enough;
     let (words, experiment) =
         words.unwrap_or_else(|| worded(search, outcome, verdict, &effects, &competing, left));
+    let words = match verdict {
+        Verdict::None if is_told => or_changing(words, known),
+        _ => words,
+    };
     let caveats = match is_told {
         true => caveats(search, outcome, &effects, known, score, &identifiability),
         false => Vec::new(),
@@ -346,6 +350,16 @@ fn worded(
         }
     };
     (verdict_words(verdict, effects, competing, more + &undetermined), experiment)
+}
+
+/// Returns the words of a verdict of no effect; where one is there that changes over the runs, those about it.
+fn or_changing(words: VerdictWords, known: &FinishedFit) -> VerdictWords {
+    let kinds: Vec<&str> = known.courses.iter().map(|(kind, _)| kind.name()).collect();
+    if kinds.is_empty() {
+        return words;
+    }
+    let heading = changing(&kinds);
+    VerdictWords { whole: heading.clone(), heading, ..words }
 }
 
 /// Describes a residual that nothing in the model stands for.

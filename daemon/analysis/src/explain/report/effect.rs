@@ -117,8 +117,7 @@ pub fn by_held_out_runs(effect: &EffectAnswer) -> Option<String> {
     Some(format!(" The {runs} runs held out by themselves give {kind}{sizes}, {judged}."))
 }
 
-/// Describes a certain and small effect: its kind with its numbers in the model, or in the trial that took it in
-/// where nothing is named.
+/// Describes a certain and small effect: its kind with its numbers jointly with the usual errors.
 pub fn small(outcome: &SearchOutcome, trial: &EffectTrial) -> String {
     let effect = &trial.fit.model.effects[trial.last()];
     let tried = trial.fit.effect_parameters(trial.last());
@@ -301,6 +300,15 @@ fn unit_of_range(place: &Location) -> &'static str {
         Some("degc") => "°C",
         _ => "",
     }
+}
+
+/// Returns the verdict where kinds act that change over the runs, and none that is the same in all of them.
+pub fn changing(kinds: &[&str]) -> String {
+    let kinds: Vec<String> = kinds.iter().map(|kind| kind_name(kind).to_owned()).collect();
+    format!(
+        "Nothing undeclared acts in all runs alike, as far as these show; over the runs changes {}.",
+        joined(&kinds)
+    )
 }
 
 /// Returns a verdict with its effects, the kinds that explain the runs as well as some of them, and the questions that

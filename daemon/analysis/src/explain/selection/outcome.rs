@@ -136,6 +136,8 @@ pub struct SearchOutcome {
     pub not_testable: Vec<(EffectKind, String)>,
     /// Kinds that are certain and small: part of the model, and not named.
     pub small: Vec<EffectKind>,
+    /// Where nothing is named: the values of these jointly with the usual errors.
+    pub(super) small_values: Vec<(EffectKind, Vec<f64>)>,
     /// Kinds that are certain jointly with the usual errors, with all trials that were certain when they were found.
     pub certain: Vec<(EffectKind, SearchRound)>,
     /// Kinds that were found and did not stand jointly with the usual errors, and why; they are not looked for again.
@@ -194,9 +196,11 @@ impl SearchOutcome {
         self.fallen.iter().map(|(kind, _)| *kind).collect()
     }
 
-    /// The values of an effect of the model by its kind.
+    /// The values of an effect by its kind: of the model, or of a certain and small one where nothing is named.
     pub fn values(&self, kind: EffectKind) -> Option<&[f64]> {
-        Some(self.fit.effect_parameters(self.fit.model.position(kind)?))
+        let small = || self.small_values.iter().find(|it| it.0 == kind).map(|it| &it.1[..]);
+        let position = self.fit.model.position(kind);
+        position.map(|index| self.fit.effect_parameters(index)).or_else(small)
     }
 
     /// Returns the trials of effects that are certain and small, from the round that accepted them.

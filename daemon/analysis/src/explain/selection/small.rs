@@ -78,6 +78,7 @@ impl Search<'_> {
         let named = usual.iter().filter(|kind| outcome.is_named(**kind));
         outcome.small.extend(named.copied().collect::<Vec<_>>());
         if kinds.len() == outcome.small.len() {
+            self.keep_values_of_small(outcome);
             outcome.fit = outcome.base.clone();
             return;
         }
@@ -99,6 +100,20 @@ impl Search<'_> {
                 outcome.fit = rest;
             }
         }
+    }
+
+    /// Keeps the values of small effects jointly with the usual errors, and of these effects those of which something is
+    /// left there.
+    fn keep_values_of_small(&self, outcome: &mut SearchOutcome) {
+        if outcome.small.is_empty() {
+            return;
+        }
+        let joint = self.refit_with_nuisance(outcome);
+        let effects = outcome.fit.model.effects.iter().enumerate();
+        let left = effects.filter(|(index, _)| !joint.holds_none(*index));
+        let values = |index: usize| joint.fit.effect_parameters(index).to_vec();
+        outcome.small_values = left.map(|(index, it)| (it.kind(), values(index))).collect();
+        outcome.small = outcome.small_values.iter().map(|it| it.0).collect();
     }
 
     /// Returns the everyday scales of which little is left jointly with the usual errors: no more than is usual, or the
