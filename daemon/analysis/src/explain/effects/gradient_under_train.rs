@@ -10,23 +10,19 @@ use std::sync::Arc;
 
 use dynocar_model::terms::Parameter;
 use dynocar_model::terms::extra::Covariate;
-use dynocar_model::track::Track;
+use dynocar_model::track::{StepProfile, Track};
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;
 
+use super::vertical_curves::VerticalCurves;
 use super::{Candidate, Handling, Hypothesis, Nature, On};
 use crate::explain::evidence::{RunData, SampleForces};
 
-/// Usual length in m over which a step is rounded; the change of the force on a train grows with the square of the
-/// length.
-pub const USUAL_LENGTH_M: f64 = 60.0;
-/// Standard deviation of the factor on the usual rounding, its greatest value, and the step of differences: lengths up
-/// to 190 m.
+/// Standard deviation of the share of the usual rounding, its greatest value, and the step of differences: lengths up
+/// to three times the usual one.
 const USUAL_STD: f64 = 1.0;
 const SHARE_MAX: f64 = 10.0;
 const STEP: f64 = 0.1;
-/// Greatest distance in m between the places over which the gradient is averaged.
-const APART_M: f64 = 15.0;
 /// Standard deviation, as a share of the train's length, of the distance from the middle to the centre of mass, its
 /// greatest value, and half the distance between the places whose gradients are compared.
 const CENTRE_STD_SHARE: f64 = 0.03;
@@ -34,10 +30,10 @@ const CENTRE_MAX_SHARE: f64 = 0.25;
 const CENTRE_HALF_SHARE: f64 = 0.05;
 
 /// Cause of a gradient of its own, in proportion to the parameter.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 enum Cause {
-    /// Steps rounded over a length in m.
-    Rounding(f64),
+    /// Steps rounded: what that adds to the gradient in ‰, and where trains the other way have another gradient to that.
+    Rounding { added: Option<StepProfile>, falling: Option<StepProfile> },
     /// The centre of mass a metre ahead of the train's middle.
     MassCentre,
 }
@@ -51,21 +47,26 @@ struct UnderTrain {
     information: DMatrix<f64>,
 }
 
-/// Returns the change of the gradient by steps that are rounded over a length in m, times a share as the parameter,
-/// with its start.
-pub fn vertical_curves(
+/// Returns the change of the gradient by vertical curves that are a factor longer than some usual ones, times a share as
+/// the parameter, with its start.
+pub fn rounded_steps(
     track: Arc<Track>,
     train_length_m: f64,
-    length_m: f64,
+    (usual, factor): (VerticalCurves, f64),
     share: f64,
 ) -> Candidate {
-    let usual = (USUAL_LENGTH_M / length_m).powi(2);
+    let curves = usual.times(factor);
+    let cause = Cause::Rounding {
+        added: track.gradient().and_then(|steps| curves.added_to(steps)),
+        falling: track.survey.gradient_falling.as_ref().and_then(|steps| curves.added_to(steps)),
+    };
+    let own = factor.powi(-2);
     let rounded = UnderTrain {
         track,
         train_length_m,
-        cause: Cause::Rounding(length_m),
-        parameters: [Parameter::new("vertical_curves", (0.0, SHARE_MAX * usual), STEP * usual)],
-        information: DMatrix::from_element(1, 1, (USUAL_STD * usual).powi(-2)),
+        cause,
+        parameters: [Parameter::new("vertical_curves", (0.0, SHARE_MAX * own), STEP * own)],
+        information: DMatrix::from_element(1, 1, (USUAL_STD * own).powi(-2)),
     };
     Candidate::new(rounded, vec![share])
 }
@@ -90,12 +91,12 @@ impl UnderTrain {
             let place_m = centre_m + offset_m;
             self.track.gradient_towards_permille(direction, place_m, self.train_length_m)
         };
-        let added_permille = match self.cause {
-            Cause::Rounding(length_m) => {
-                let places = (length_m / APART_M).ceil().max(2.0);
-                let place_m = |k: usize| length_m * ((k as f64 + 0.5) / places - 0.5);
-                let around: f64 = (0..places as usize).filter_map(|k| at(place_m(k))).sum();
-                around / places - at(0.0).unwrap_or(0.0)
+        let added_permille = match &self.cause {
+            Cause::Rounding { added, falling } => {
+                let is_other_way = direction < 0.0 && self.track.survey.gradient_falling.is_some();
+                let added = if is_other_way { falling } else { added };
+                let true_m = centre_m - self.track.gradient_shift_m;
+                added.as_ref().map_or(0.0, |it| it.mean_around(true_m, self.train_length_m))
             }
             Cause::MassCentre => {
                 let half_m = CENTRE_HALF_SHARE * self.train_length_m;
@@ -163,18 +164,12 @@ mod tests {
     }
 
     #[test]
-    fn a_step_is_rounded_to_both_sides_and_a_slope_stays() {
+    fn a_rounded_step_is_climbed_earlier_and_left_as_early_the_other_way() {
         let steps = [(0.0, 0.0), (1000.0, 8.0)];
         let track = Track::new("line".into(), None, Some(&steps), None, None).unwrap();
-        let rounded =
-            |train_length_m| under_train(&track, train_length_m, Cause::Rounding(USUAL_LENGTH_M));
-        let (short, train) = (rounded(10.0), rounded(80.0));
-        // Where the train comes under the step it climbs already, and less where it would be on it.
-        assert!(train.added_permille(960.0, 1.0) > 0.2 && train.added_permille(1040.0, 1.0) < -0.2);
+        let added = VerticalCurves::USUAL.added_to(track.gradient().unwrap());
+        let train = under_train(&track, 80.0, Cause::Rounding { added, falling: None });
+        assert!(train.added_permille(960.0, 1.0) > 0.2);
         assert_eq!(train.added_permille(960.0, -1.0), -train.added_permille(960.0, 1.0));
-        assert!(short.added_permille(985.0, 1.0) > train.added_permille(985.0, 1.0));
-        for chainage_m in [800.0, 1000.0, 1200.0] {
-            assert!(train.added_permille(chainage_m, 1.0).abs() < 1e-12);
-        }
     }
 }

@@ -26,6 +26,7 @@ mod speed_delay;
 mod tunnel_drag;
 mod unknown;
 mod usual_errors;
+mod vertical_curves;
 mod wheel_diameter;
 mod wind;
 
@@ -37,11 +38,12 @@ pub use super::hypothesis::{
     SharedHypothesis, Turn,
 };
 pub use gradient_error::map_error;
-pub use gradient_under_train::{USUAL_LENGTH_M, mass_centre, vertical_curves};
+pub use gradient_under_train::{mass_centre, rounded_steps};
 pub use proposal::{
     Candidate, Certainty, DeclaredFigure, Effect, Everyday, Policy, Proposal, Whole,
 };
 pub use usual_errors::{map_error_as_fitted, usual_errors};
+pub use vertical_curves::VerticalCurves;
 
 /// Every kind, in the order of the search: timing, scales, mass and gain, effects tied to a place, environment,
 /// actuators. Forces outside the library come last.

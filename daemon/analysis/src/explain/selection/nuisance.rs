@@ -19,10 +19,10 @@ use super::outcome::{
 use super::search::Search;
 use super::trying::{Asked, PROMISE_TIMES};
 use crate::explain::effects::{
-    Candidate, DeclaredFigure, USUAL_LENGTH_M, map_error, map_error_as_fitted, mass_centre,
-    policy_of, usual_errors, vertical_curves,
+    Candidate, DeclaredFigure, VerticalCurves, map_error, map_error_as_fitted, mass_centre,
+    policy_of, rounded_steps, usual_errors,
 };
-use crate::explain::evidence::{Fit, FitProblem};
+use crate::explain::evidence::{EQUAL, Fit, FitProblem};
 use crate::explain::places::{SURVEYED, span_m};
 
 /// Returns whether some evidence makes the last effect of a trial certain jointly with the usual errors.
@@ -86,30 +86,52 @@ impl Search<'_> {
             return Vec::new();
         };
         let length_m = self.train.length_m;
-        let rounded = vertical_curves(track.clone(), length_m, USUAL_LENGTH_M, 0.0);
+        let rounded = rounded_steps(track.clone(), length_m, (VerticalCurves::USUAL, 1.0), 0.0);
         vec![map_error(span_m, SURVEYED), mass_centre(track.clone(), length_m), rounded]
     }
 
     /// Fits again with steps rounded over the length that a fit shows, where it shows another than the usual one: a
-    /// share of another length has another shape, and a rotating mass takes up the difference.
+    /// share of another length has another shape, and a rotating mass takes up the difference. Where curves of one
+    /// radius fit better, it is these.
     fn round_as_found(&self, fit: &mut Fit, number: usize) {
         let Some(track) = self.track else { return };
-        let mut length_m = USUAL_LENGTH_M;
-        for _ in 0..ROUNDING_TURNS {
+        let shows_rounding = self.round_until_whole(fit, (number, VerticalCurves::USUAL));
+        let Some(of_radius) = VerticalCurves::of_usual_radius(track).filter(|_| shows_rounding)
+        else {
+            return;
+        };
+        let mut other = self.rounded(fit, (number, of_radius), 1.0);
+        self.round_until_whole(&mut other, (number, of_radius));
+        if other.cost < fit.cost - EQUAL {
+            *fit = other;
+        }
+    }
+
+    /// Fits again with curves of other lengths until these are whole; returns whether any are shown.
+    fn round_until_whole(&self, fit: &mut Fit, (number, usual): (usize, VerticalCurves)) -> bool {
+        let mut factor = 1.0;
+        for turn in 0..ROUNDING_TURNS {
             let at = fit.model.ranges()[number].start;
             let share = fit.theta[at];
             let std = deviations_with_nuisance(fit, fit.theta.len(), 0).std[at];
             let is_shown = std.is_finite() && share > HALF_95 * std;
             if !is_shown || (share - 1.0).abs() < ROUNDING_SHARE {
-                return;
+                return is_shown || turn > 0;
             }
-            length_m *= share.sqrt();
-            let rounded = vertical_curves(track.clone(), self.train.length_m, length_m, 1.0);
-            let (mut model, mut theta) = (fit.model.clone(), fit.theta.clone());
-            model.effects[number] = rounded.hypothesis;
-            theta[at] = 1.0;
-            *fit = self.problem.fit(&model, theta, fit.noise);
+            factor *= share.sqrt();
+            *fit = self.rounded(fit, (number, usual), factor);
         }
+        true
+    }
+
+    /// Fits again with vertical curves that are a factor longer than some usual ones.
+    fn rounded(&self, fit: &Fit, (number, usual): (usize, VerticalCurves), factor: f64) -> Fit {
+        let Some(track) = self.track else { return fit.clone() };
+        let rounded = rounded_steps(track.clone(), self.train.length_m, (usual, factor), 1.0);
+        let (mut model, mut theta) = (fit.model.clone(), fit.theta.clone());
+        theta[model.ranges()[number].start] = 1.0;
+        model.effects[number] = rounded.hypothesis;
+        self.problem.fit(&model, theta, fit.noise)
     }
 
     /// Accepts an effect that is certain jointly with the usual errors; returns false without one.
