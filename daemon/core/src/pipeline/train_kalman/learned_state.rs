@@ -10,8 +10,9 @@ use super::forces::BrakeErrors;
 use super::motion_bank::{MotionBank, SpeedLikelihood};
 use super::motion_filter::{
     BRAKE_ERROR, BRAKE_SCALE, COEFFICIENTS, FORCE_DELAY, LOAD, MotionState, RESISTANCE, SPEED,
-    StateCovariance, TRACTION_SCALE, WIND,
+    STATES, StateCovariance, TRACTION_SCALE, WEIGHER, WIND,
 };
+use crate::filter::Gaussian;
 use crate::pipeline::InnovationMonitor;
 use crate::pipeline::momentum::{regressors, scaled, unscaling};
 use crate::pipeline::motion::{SpeedNoise, StopWatch, is_same_mass};
@@ -156,6 +157,7 @@ impl ResistanceBelief {
         all[(BRAKE_SCALE, BRAKE_SCALE)] = settings.brake_scale_std.powi(2);
         all[(FORCE_DELAY, FORCE_DELAY)] = settings.force_delay_std_s.powi(2);
         all[(WIND, WIND)] = settings.wind_std_mps.powi(2);
+        all[(WEIGHER, WEIGHER)] = WEIGHER_SHARE * (0.01 * settings.mass_std_percent).powi(2);
         MotionBank::new(&mean, &all)
     }
 }
@@ -166,11 +168,34 @@ pub fn declared_a_std(train: &dynocar_model::train::TrainModel) -> f64 {
     ResistanceBelief::declared(&train.resistance, relative_std).a_std()
 }
 
+/// Share of a weighing's variance that is the weigher's own error, the same at every weighing; the rest is another each
+/// time.
+const WEIGHER_SHARE: f64 = 0.5;
+/// Share of the weigher's error that is left after a stop.
+const WEIGHER_KEPT: f64 = 0.99;
+
+/// Takes a weighing of a variance in: the load factor starts anew, but for the weigher's error so far.
+pub fn weigh(belief: &mut Gaussian<STATES>, variance: f64) {
+    let mut gradient = MotionState::zeros();
+    gradient[WEIGHER] = 1.0;
+    belief.rewrite(LOAD, 1.0 + belief.mean[WEIGHER], &gradient, (1.0 - WEIGHER_SHARE) * variance);
+}
+
+/// Lets the error of a weigher of a variance become a little another one.
+pub fn age_weigher(belief: &mut Gaussian<STATES>, variance: f64) {
+    let renewed = WEIGHER_SHARE * variance * (1.0 - WEIGHER_KEPT * WEIGHER_KEPT);
+    belief.fade(WEIGHER, WEIGHER_KEPT, renewed);
+}
+
 /// Change by a sample of the load factor's estimate: the declared mass over the true one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LoadChange {
-    /// The load factor starts anew, as well known as a new weighing or the declaration allows: a mean and a variance.
+    /// The load factor starts anew, as well known as the declaration allows: a mean and a variance.
     Anew(f64, f64),
+    /// The load was weighed, with an error of this variance as a share of its square.
+    Weighed(f64),
+    /// The weigher shows the load of before times this factor, by its noise: no load changes under way.
+    ShownAs(f64),
     /// The load may have changed by this variance as a share of its square, at most to the uncertainty of any load of
     /// this mean and variance.
     Opened { by: f64, mean: f64, variance: f64 },
@@ -198,6 +223,8 @@ pub struct LoadWatch {
     load_change_std: f64,
     /// Mass in kg that the load factor refers to; `None` before the first sample.
     declared_kg: Option<f64>,
+    /// Mass in kg that was weighed last while the load could change.
+    weighed_kg: Option<f64>,
     /// True when the newest samples carry a mass.
     pub is_weighed: bool,
     /// True when the train left a stop with the newest sample.
@@ -228,6 +255,7 @@ impl LoadWatch {
             declared,
             load_change_std: 0.01 * settings.load_change_std_percent,
             declared_kg: None,
+            weighed_kg: None,
             is_weighed: false,
             has_departed: false,
             is_open: false,
@@ -239,6 +267,20 @@ impl LoadWatch {
     pub fn prior(&self) -> (f64, f64) {
         let (mean, std) = if self.is_weighed { (1.0, self.mass_std) } else { self.declared };
         (mean, std * std)
+    }
+
+    /// Variance of a weighing, as a share of the mass.
+    pub fn weighing_variance(&self) -> f64 {
+        self.mass_std * self.mass_std
+    }
+
+    /// Returns the change by which only that is known of the load.
+    pub fn renewed(&self) -> LoadChange {
+        let (mean, variance) = self.prior();
+        match self.is_weighed {
+            true => LoadChange::Weighed(variance),
+            false => LoadChange::Anew(mean, variance),
+        }
     }
 
     /// Returns the least and the greatest mass in kg that neither the declaration nor the samples contradict: forces that
@@ -265,11 +307,19 @@ impl LoadWatch {
         self.has_departed = self.stops.departs(sample.time_ns, sample.segment, sample.speed_mps);
         let before_kg = self.declared_kg.replace(sample.mass_kg);
         let was_open = std::mem::replace(&mut self.is_open, self.stops.is_due());
-        let (mean, variance) = self.prior();
-        let anew = LoadChange::Anew(mean, variance);
-        let Some(before_kg) = before_kg else { return Some(anew) };
+        let anew = self.renewed();
+        let Some(before_kg) = before_kg else {
+            self.weighed_kg = Some(sample.mass_kg).filter(|_| self.is_weighed);
+            return Some(anew);
+        };
         if self.is_weighed && !is_same_mass(before_kg, sample.mass_kg) {
+            let is_under_way = !(was_open || self.is_open || self.has_departed);
+            let changed = sample.mass_kg / self.weighed_kg.unwrap_or(0.0) - 1.0;
+            if is_under_way && changed.abs() < self.mass_std {
+                return Some(LoadChange::ShownAs(sample.mass_kg / before_kg));
+            }
             self.is_fresh = !self.has_departed;
+            self.weighed_kg = Some(sample.mass_kg);
             return Some(anew);
         }
         // At the stop, not at the departure: nobody knows who boards while the train stands.

@@ -27,8 +27,10 @@ pub const WIND: usize = 9;
 pub const BRAKE_SCALE: usize = 10;
 /// Index of the error of the map's gradient in ‰, climbing where the chainage grows.
 pub const MAP_ERROR: usize = 11;
+/// Index of the weigher's error that is the same at every weighing, as a share of the mass.
+pub const WEIGHER: usize = 12;
 /// Number of states.
-pub const STATES: usize = 12;
+pub const STATES: usize = 13;
 
 /// A state.
 pub type MotionState = SVector<f64, STATES>;
@@ -143,15 +145,16 @@ impl MotionFilter {
     pub fn predict(&mut self, step: &FilterStep) {
         let state = self.belief.mean;
         let (load, later_s) = (state[LOAD], state[FORCE_DELAY] - step.delay_s);
-        let by_traction = 1.0 + state[TRACTION_SCALE];
         let traction = step.traction - later_s * step.traction_change;
-        let force = by_traction * traction - step.brake;
-        let change = by_traction * step.traction_change;
-        // Not times the load: a product of two unknowns would seem better known than it is.
+        let force = traction - step.brake;
+        let change = step.traction_change;
+        // Not times the load: a product of two unknowns would seem better known than it is, and with each load a little
+        // more, until the scale is believed that the noise of many stops made.
         let unexplained = step.duration_s
             * (state[DISTURBANCE] + step.direction * state[MAP_ERROR])
             + step.brake_std * state[BRAKE_ERROR]
-            + step.brake * state[BRAKE_SCALE];
+            + step.brake * state[BRAKE_SCALE]
+            - traction * state[TRACTION_SCALE];
         let impulse = load * force - step.known - unexplained;
         let resistance = |powers: &[f64; COEFFICIENTS]| -> f64 {
             (0..COEFFICIENTS).map(|i| powers[i] * state[RESISTANCE + i]).sum()
@@ -178,12 +181,13 @@ impl MotionFilter {
             gradient[RESISTANCE + i] = -seconds * mean[i];
         }
         gradient[WIND] = -seconds * (step.by_wind + 2.0 * step.by_wind_square * state[WIND]);
-        gradient[TRACTION_SCALE] = per_inertia * load * traction;
+        gradient[TRACTION_SCALE] = per_inertia * traction;
         gradient[BRAKE_ERROR] = -per_inertia * step.brake_std;
         gradient[BRAKE_SCALE] = -per_inertia * step.brake;
-        gradient[FORCE_DELAY] = -per_inertia * load * change;
+        let by_scale = state[TRACTION_SCALE];
+        gradient[FORCE_DELAY] = -per_inertia * (load + by_scale) * change;
 
-        let jump = step.jump_share * jump_variance(load * change, step.duration_s);
+        let jump = step.jump_share * jump_variance((load + by_scale) * change, step.duration_s);
         self.jump_variance = jump * per_inertia * per_inertia;
         let missed = step.impulse_variance + (INTEGRATION_SHARE * step.duration_s * w0).powi(2);
         let variance = self.jump_variance + missed * per_inertia * per_inertia;
@@ -301,8 +305,9 @@ mod tests {
     }
 
     fn filter() -> MotionFilter {
-        let mean =
-            MotionState::from([21.0, 0.3, 0.95, 1.6, 0.4, 0.9, 0.01, -0.02, 0.15, -1.2, 0.1, 0.2]);
+        let mean = MotionState::from([
+            21.0, 0.3, 0.95, 1.6, 0.4, 0.9, 0.01, -0.02, 0.15, -1.2, 0.1, 0.2, 0.01,
+        ]);
         let belief = Gaussian { mean, covariance: StateCovariance::zeros() };
         MotionFilter { behaviour: behaviours()[0], belief, jump_variance: 0.0 }
     }
