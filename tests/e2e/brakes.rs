@@ -150,6 +150,21 @@ fn stops_that_show_no_brake_are_named_with_what_remains() {
 }
 
 #[test]
+fn speeds_in_another_unit_are_refused_and_give_no_brake() {
+    let site = site(1.0, false, TRAIN);
+    let manifest = std::fs::read_to_string(site.path().join("dataset.toml")).unwrap();
+    let in_m_per_s = "column = \"v\", unit = \"m/s\"";
+    let tenfold = "column = \"v\", unit = \"m/s\", scale = 10.0";
+    site.write("dataset.toml", &manifest.replace(in_m_per_s, tenfold));
+    let etcs = site.path().join("etcs.json");
+    let folder = site.path().display().to_string();
+    let output = dynocar(&["brakes", &folder, "--etcs", etcs.to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(2), "{}", words(&output));
+    assert!(words(&output).contains("the data cannot be true as described"), "{}", words(&output));
+    assert!(!etcs.exists());
+}
+
+#[test]
 fn every_value_of_the_form_says_what_it_rests_on_and_guesses_say_so() {
     let site = site(1.0, false, TRAIN);
     let recorded = std::fs::read_to_string(site.path().join("run.csv")).unwrap();

@@ -3,8 +3,9 @@
 use dynocar::cli::text::{WIDTH, wrap};
 use dynocar::models::UtcSecond;
 use dynocar_analysis::dataset::{
-    DatasetDiagnostic, ForceSource, GradientSource, PositionSource, Run,
+    Dataset, DatasetDiagnostic, ForceSource, GradientSource, PositionSource, Run,
 };
+use dynocar_core::plausibility::Severity;
 
 /// Returns a run's mass in t: the declared one, or the mean of the masses in its samples, with their range where they
 /// differ.
@@ -81,10 +82,15 @@ pub fn diagnostics(diagnostics: &[DatasetDiagnostic]) -> String {
     diagnostics.iter().map(line).collect()
 }
 
+/// Returns why a dataset cannot be true as described, for a result that would rest on it; `None` where it may be.
+pub fn impossible(dataset: &Dataset) -> Option<String> {
+    let notes = dataset.diagnostics();
+    let why = notes.iter().find(|it| it.severity == Severity::Fundamental)?;
+    Some(format!("{}: the data cannot be true as described: {why}", dataset.name))
+}
+
 #[cfg(test)]
 mod tests {
-    use dynocar_analysis::dataset::Dataset;
-
     use super::*;
 
     fn run(columns: &str, keys: &str, csv: &str) -> Run {

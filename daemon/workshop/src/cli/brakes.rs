@@ -17,6 +17,7 @@ use crate::dataset;
 use crate::report::PAGE_MARK;
 use crate::report::html::TableColumns;
 use crate::report::provenance::{Provenance, own_command_line};
+use crate::run_facts::impossible;
 use dynocar::cli::Failure;
 use dynocar::cli::text::{TextTable, entry};
 use dynocar::dataset::labelled_text;
@@ -124,6 +125,9 @@ fn studied(
     arguments: &BrakesArguments,
 ) -> Result<(Vec<Dataset>, Study), Failure> {
     let datasets: Vec<Dataset> = paths.iter().map(dataset::load).collect::<Result<_, _>>()?;
+    if let Some(why) = datasets.iter().find_map(impossible) {
+        return Err(Failure::Input(why));
+    }
     let mut study = Study::of_all(&datasets, &arguments.study.settings(), &[]);
     if let (true, Some(law)) = (arguments.without_resistance, &mut study.law) {
         let train = &datasets[0].train;

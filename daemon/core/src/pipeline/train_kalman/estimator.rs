@@ -10,11 +10,9 @@ use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Quantity, Rejec
 
 use super::TrainKalmanSettings;
 use super::forces::BrakeErrors;
-use super::learned_state::{
-    JumpShare, LearnedState, LoadChange, LoadWatch, ResistanceBelief, age_weigher, weigh,
-};
+use super::learned_state::{JumpShare, LearnedState, LoadChange, LoadWatch, ResistanceBelief};
 use super::motion_bank::SpeedLikelihood;
-use super::motion_filter::{FORCE_DELAY, LOAD, SPEED, wind_over};
+use super::motion_filter::{FORCE_DELAY, SPEED, wind_over};
 use super::report::{Systematic, TrainKalmanReport};
 use super::step_builder::StepBuilder;
 use crate::pipeline::judge::{InputState, Judgement, LONG_RUN_MAX};
@@ -171,7 +169,7 @@ impl TrainKalman {
     fn reset(&mut self) {
         self.learned.bank = self.first.bank(&self.settings);
         self.steps.leave_line();
-        self.renew_load(self.load.renewed());
+        self.learned.bank.change_load(self.load.renewed());
         self.learned.noise.reset();
         self.learned.jumps = JumpShare::default();
         self.learned.brake = BrakeErrors::new(self.settings.brake_scale_std);
@@ -211,7 +209,7 @@ impl TrainKalman {
             ((load - usual).powi(2) <= allowed).then_some((load, variance))
         });
         let (load, variance) = mass.unwrap_or(self.load.prior());
-        self.learned.bank.each(|it| it.replace(LOAD, load, variance));
+        self.learned.bank.change_load(LoadChange::Anew(load, variance));
         if interrupted_s.is_some() {
             let mut known = kept.use_before.usable_quantities;
             if mass.is_none() {
@@ -225,21 +223,6 @@ impl TrainKalman {
         mass.is_some()
     }
 
-    /// Changes what is known of the load.
-    fn renew_load(&mut self, change: LoadChange) {
-        self.learned.bank.each(|it| match change {
-            LoadChange::Anew(load, variance) => it.replace(LOAD, load, variance),
-            LoadChange::Weighed(variance) => weigh(it, variance),
-            LoadChange::ShownAs(factor) => it.fade(LOAD, factor, 0.0),
-            LoadChange::Opened { by, mean, variance } => {
-                // Any load's mean square distance from the one believed so far.
-                let now = it.mean[LOAD];
-                let most = variance + (now - mean).powi(2) - it.covariance[(LOAD, LOAD)];
-                it.disturb(LOAD, (by * now * now).min(most.max(0.0)));
-            }
-        });
-    }
-
     /// Follows the load from sample to sample.
     fn follow_load(&mut self, sample: &ResolvedSample) {
         let change = self.load.see(sample);
@@ -249,12 +232,12 @@ impl TrainKalman {
             return;
         }
         if let Some(change) = change {
-            self.renew_load(change);
+            self.learned.bank.change_load(change);
             self.judge(0.0, 0.0);
         }
         if self.load.has_departed {
             let variance = self.load.weighing_variance();
-            self.learned.bank.each(|it| age_weigher(it, variance));
+            self.learned.bank.age_weigher(variance);
             self.systematic.start();
         }
     }

@@ -10,9 +10,9 @@ use super::forces::BrakeErrors;
 use super::motion_bank::{MotionBank, SpeedLikelihood};
 use super::motion_filter::{
     BRAKE_ERROR, BRAKE_SCALE, COEFFICIENTS, FORCE_DELAY, LOAD, MotionState, RESISTANCE, SPEED,
-    STATES, StateCovariance, TRACTION_SCALE, WEIGHER, WIND,
+    StateCovariance, TRACTION_SCALE, WIND,
 };
-use crate::filter::Gaussian;
+use super::weigher::Weigher;
 use crate::pipeline::InnovationMonitor;
 use crate::pipeline::momentum::{regressors, scaled, unscaling};
 use crate::pipeline::motion::{SpeedNoise, StopWatch, is_same_mass};
@@ -157,8 +157,8 @@ impl ResistanceBelief {
         all[(BRAKE_SCALE, BRAKE_SCALE)] = settings.brake_scale_std.powi(2);
         all[(FORCE_DELAY, FORCE_DELAY)] = settings.force_delay_std_s.powi(2);
         all[(WIND, WIND)] = settings.wind_std_mps.powi(2);
-        all[(WEIGHER, WEIGHER)] = WEIGHER_SHARE * (0.01 * settings.mass_std_percent).powi(2);
-        MotionBank::new(&mean, &all)
+        let weigher = Weigher::new((0.01 * settings.mass_std_percent).powi(2));
+        MotionBank::new(&mean, &all, weigher)
     }
 }
 
@@ -168,32 +168,13 @@ pub fn declared_a_std(train: &dynocar_model::train::TrainModel) -> f64 {
     ResistanceBelief::declared(&train.resistance, relative_std).a_std()
 }
 
-/// Share of a weighing's variance that is the weigher's own error, the same at every weighing; the rest is another each
-/// time.
-const WEIGHER_SHARE: f64 = 0.5;
-/// Share of the weigher's error that is left after a stop.
-const WEIGHER_KEPT: f64 = 0.99;
-
-/// Takes a weighing of a variance in: the load factor starts anew, but for the weigher's error so far.
-pub fn weigh(belief: &mut Gaussian<STATES>, variance: f64) {
-    let mut gradient = MotionState::zeros();
-    gradient[WEIGHER] = 1.0;
-    belief.rewrite(LOAD, 1.0 + belief.mean[WEIGHER], &gradient, (1.0 - WEIGHER_SHARE) * variance);
-}
-
-/// Lets the error of a weigher of a variance become a little another one.
-pub fn age_weigher(belief: &mut Gaussian<STATES>, variance: f64) {
-    let renewed = WEIGHER_SHARE * variance * (1.0 - WEIGHER_KEPT * WEIGHER_KEPT);
-    belief.fade(WEIGHER, WEIGHER_KEPT, renewed);
-}
-
 /// Change by a sample of the load factor's estimate: the declared mass over the true one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LoadChange {
     /// The load factor starts anew, as well known as the declaration allows: a mean and a variance.
     Anew(f64, f64),
-    /// The load was weighed, with an error of this variance as a share of its square.
-    Weighed(f64),
+    /// The load was weighed.
+    Weighed,
     /// The weigher shows the load of before times this factor, by its noise: no load changes under way.
     ShownAs(f64),
     /// The load may have changed by this variance as a share of its square, at most to the uncertainty of any load of
@@ -278,7 +259,7 @@ impl LoadWatch {
     pub fn renewed(&self) -> LoadChange {
         let (mean, variance) = self.prior();
         match self.is_weighed {
-            true => LoadChange::Weighed(variance),
+            true => LoadChange::Weighed,
             false => LoadChange::Anew(mean, variance),
         }
     }

@@ -28,6 +28,7 @@ mod report;
 mod step_builder;
 #[cfg(test)]
 mod tests;
+mod weigher;
 
 settings! {
     /// Settings of [`TrainKalman`].

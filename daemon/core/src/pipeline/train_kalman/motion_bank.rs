@@ -2,10 +2,12 @@
 
 use nalgebra::{Matrix4, Vector3, Vector4};
 
+use super::learned_state::LoadChange;
 use super::motion_filter::{
     BEHAVIOURS, BRAKE_ERROR, DISTURBANCE, FilterStep, LOAD, MAP_ERROR, MapErrorStep, MotionFilter,
     MotionState, RESISTANCE, SPEED, STATES, StateCovariance, WIND, behaviours,
 };
+use super::weigher::Weigher;
 use crate::filter::bank::{Bank, Mixture};
 use crate::filter::{Gaussian, NotPositiveDefinite};
 use crate::pipeline::motion::{OutlierRow, Trust};
@@ -73,12 +75,12 @@ pub struct Published {
 
 impl MotionBank {
     /// All behaviours, each believing the same of everything but the disturbance.
-    pub fn new(mean: &MotionState, covariance: &StateCovariance) -> Self {
+    pub fn new(mean: &MotionState, covariance: &StateCovariance, weigher: Weigher) -> Self {
         let behaviours = behaviours();
         let rivals = behaviours.map(|behaviour| {
             let mut belief = Gaussian { mean: *mean, covariance: *covariance };
             belief.replace(DISTURBANCE, 0.0, behaviour.std_n_per_kn.powi(2));
-            let filter = MotionFilter { behaviour, belief, jump_variance: 0.0 };
+            let filter = MotionFilter { behaviour, belief, weigher, jump_variance: 0.0 };
             Rival { filter, outliers: OutlierRow::default() }
         });
         let mut rivals = Bank::even(rivals, 0.0);
@@ -89,9 +91,29 @@ impl MotionBank {
         MotionBank { rivals }
     }
 
-    /// Changes the belief of every filter.
-    pub fn each(&mut self, change: impl Fn(&mut Gaussian<STATES>)) {
-        self.rivals.hypotheses_mut().iter_mut().for_each(|it| change(&mut it.filter.belief));
+    /// Changes what is known of the load.
+    pub fn change_load(&mut self, change: LoadChange) {
+        for Rival { filter: MotionFilter { belief, weigher, .. }, .. } in
+            self.rivals.hypotheses_mut()
+        {
+            match change {
+                LoadChange::Anew(load, variance) => weigher.forget_load(belief, load, variance),
+                LoadChange::Weighed => weigher.weigh(belief),
+                LoadChange::ShownAs(factor) => weigher.shown_as(belief, factor),
+                LoadChange::Opened { by, mean, variance } => {
+                    // Any load's mean square distance from the one believed so far.
+                    let now = belief.mean[LOAD];
+                    let most = variance + (now - mean).powi(2) - belief.covariance[(LOAD, LOAD)];
+                    weigher.disturb(belief, (by * now * now).min(most.max(0.0)));
+                }
+            }
+        }
+    }
+
+    /// Lets a stop pass, after which the weigher's own error is a little another one.
+    pub fn age_weigher(&mut self, weighing_variance: f64) {
+        let rivals = self.rivals.hypotheses_mut().iter_mut();
+        rivals.for_each(|it| it.filter.weigher.age(weighing_variance));
     }
 
     /// Begins a motion at a measured speed with the variance of its noise, after a time in s without a sight of it, of
@@ -235,7 +257,8 @@ mod tests {
             for (i, j, value) in [(3, 3, 0.010), (9, 9, 2.0), (3, 9, -0.1), (9, 3, -0.1)] {
                 covariance[(i, j)] = value;
             }
-            MotionBank::new(&mean, &covariance).published(0.0, 0.0, c).covariance[(0, 0)]
+            MotionBank::new(&mean, &covariance, Weigher::new(0.0)).published(0.0, 0.0, c).covariance
+                [(0, 0)]
         };
         // Of 0.010 the wind leaves 0.1² / 2 = 0.005; it acts in proportion to c.
         assert!((variance_of_a(c) - 0.010).abs() < 1e-12);

@@ -3,6 +3,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use super::weigher::Weigher;
 use crate::filter::Gaussian;
 use crate::pipeline::momentum::regressors;
 use crate::pipeline::motion::jump_variance;
@@ -27,10 +28,8 @@ pub const WIND: usize = 9;
 pub const BRAKE_SCALE: usize = 10;
 /// Index of the error of the map's gradient in ‰, climbing where the chainage grows.
 pub const MAP_ERROR: usize = 11;
-/// Index of the weigher's error that is the same at every weighing, as a share of the mass.
-pub const WEIGHER: usize = 12;
 /// Number of states.
-pub const STATES: usize = 13;
+pub const STATES: usize = 12;
 
 /// A state.
 pub type MotionState = SVector<f64, STATES>;
@@ -132,6 +131,8 @@ pub struct MotionFilter {
     pub behaviour: Behaviour,
     /// State estimate.
     pub belief: Gaussian<STATES>,
+    /// What weighs the train.
+    pub weigher: Weigher,
     /// Variance in (m/s)² of the speed that the newest step brought by forces that jumped.
     pub jump_variance: f64,
 }
@@ -305,11 +306,11 @@ mod tests {
     }
 
     fn filter() -> MotionFilter {
-        let mean = MotionState::from([
-            21.0, 0.3, 0.95, 1.6, 0.4, 0.9, 0.01, -0.02, 0.15, -1.2, 0.1, 0.2, 0.01,
-        ]);
+        let mean =
+            MotionState::from([21.0, 0.3, 0.95, 1.6, 0.4, 0.9, 0.01, -0.02, 0.15, -1.2, 0.1, 0.2]);
         let belief = Gaussian { mean, covariance: StateCovariance::zeros() };
-        MotionFilter { behaviour: behaviours()[0], belief, jump_variance: 0.0 }
+        let weigher = Weigher::new(0.0);
+        MotionFilter { behaviour: behaviours()[0], belief, weigher, jump_variance: 0.0 }
     }
 
     /// The speed after a step from a state.
@@ -318,6 +319,39 @@ mod tests {
         moved.belief.mean = mean;
         moved.predict(&step());
         moved.belief.mean[SPEED]
+    }
+
+    #[test]
+    fn loads_of_which_nothing_is_known_teach_the_scale_of_the_traction_nothing() {
+        const SCALE_STD: f64 = 0.007;
+        let accelerating = FilterStep { brake: 0.0, delay_s: 0.0, ..step() };
+        let (mut truth, mut learned) = (filter(), filter());
+        for it in [&mut truth, &mut learned] {
+            it.belief.mean[TRACTION_SCALE] = 0.0;
+            it.belief.mean[FORCE_DELAY] = 0.0;
+        }
+        learned.belief.covariance[(TRACTION_SCALE, TRACTION_SCALE)] = SCALE_STD * SCALE_STD;
+        let mut sample = 0.0_f64;
+        let mut noise_mps = || {
+            sample += 1.0;
+            0.02 * (12.9898 * sample * sample).sin()
+        };
+        for stop in 0..400 {
+            truth.belief.mean[LOAD] = if stop % 2 == 0 { 0.85 } else { 1.15 };
+            truth.belief.mean[SPEED] = 10.0;
+            learned.belief.replace(LOAD, 1.0, 1.0);
+            learned.belief.replace(SPEED, 10.0 + noise_mps(), 2e-4);
+            for _ in 0..30 {
+                truth.predict(&accelerating);
+                learned.predict(&accelerating);
+                let measured_mps = truth.belief.mean[SPEED] + noise_mps();
+                learned.belief.measure(SPEED, measured_mps, 2e-4).unwrap();
+            }
+        }
+        let Gaussian { mean, covariance } = &learned.belief;
+        assert!(mean[TRACTION_SCALE].abs() < 0.1 * SCALE_STD, "{}", mean[TRACTION_SCALE]);
+        let std = covariance[(TRACTION_SCALE, TRACTION_SCALE)].sqrt();
+        assert!(std > 0.99 * SCALE_STD, "{std}");
     }
 
     #[test]
