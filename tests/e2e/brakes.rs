@@ -150,12 +150,9 @@ fn stops_that_show_no_brake_are_named_with_what_remains() {
 }
 
 #[test]
-fn speeds_in_another_unit_are_refused_and_give_no_brake() {
-    let site = site(1.0, false, TRAIN);
-    let manifest = std::fs::read_to_string(site.path().join("dataset.toml")).unwrap();
-    let in_m_per_s = "column = \"v\", unit = \"m/s\"";
-    let tenfold = "column = \"v\", unit = \"m/s\", scale = 10.0";
-    site.write("dataset.toml", &manifest.replace(in_m_per_s, tenfold));
+fn a_train_that_cannot_be_true_is_refused_and_gives_no_brake() {
+    let in_kg = TRAIN.replace("mass_t = 100", "mass_t = 100000");
+    let site = site(1.0, false, &in_kg);
     let etcs = site.path().join("etcs.json");
     let folder = site.path().display().to_string();
     let output = dynocar(&["brakes", &folder, "--etcs", etcs.to_str().unwrap()]);

@@ -64,12 +64,8 @@ pub fn answer(
     let left = left.as_ref();
     let words = impossible(&diagnostics);
     let is_told = words.is_none() && is_enough;
-    let (words, experiment) =
-        words.unwrap_or_else(|| worded(search, outcome, verdict, &effects, &competing, left));
-    let words = match verdict {
-        Verdict::None if is_told => or_changing(words, known),
-        _ => words,
-    };
+    let (words, experiment) = words
+        .unwrap_or_else(|| worded(search, outcome, verdict, &effects, &competing, left, known));
     let caveats = match is_told {
         true => caveats(search, outcome, &effects, known, score, &identifiability),
         false => Vec::new(),
@@ -306,6 +302,7 @@ fn worded(
     effects: &[EffectAnswer],
     competing: &[CompetingHypotheses],
     left: Option<&Unexplained>,
+    known: &FinishedFit,
 ) -> Words {
     let undetermined = left.map(Unexplained::undetermined).unwrap_or_default();
     let (more, experiment) = match verdict {
@@ -349,7 +346,9 @@ fn worded(
             (String::new(), experiment)
         }
     };
-    (verdict_words(verdict, effects, competing, more + &undetermined), experiment)
+    let words = verdict_words(verdict, effects, competing, more + &undetermined);
+    let is_none = verdict == Verdict::None;
+    (if is_none { or_changing(words, known) } else { words }, experiment)
 }
 
 /// Returns the words of a verdict of no effect; where one is there that changes over the runs, those about it.

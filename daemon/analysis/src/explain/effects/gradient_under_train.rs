@@ -32,7 +32,7 @@ const CENTRE_HALF_SHARE: f64 = 0.05;
 /// Cause of a gradient of its own, in proportion to the parameter.
 #[derive(Clone, Debug)]
 enum Cause {
-    /// Steps rounded: what that adds to the gradient in ‰, and where trains the other way have another gradient to that.
+    /// Rounded steps: their addition to the gradient in ‰, and that where trains the other way have another gradient.
     Rounding { added: Option<StepProfile>, falling: Option<StepProfile> },
     /// The centre of mass a metre ahead of the train's middle.
     MassCentre,

@@ -10,11 +10,12 @@ use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Quantity, Rejec
 
 use super::TrainKalmanSettings;
 use super::forces::BrakeErrors;
-use super::learned_state::{JumpShare, LearnedState, LoadChange, LoadWatch, ResistanceBelief};
+use super::learned_state::{JumpShare, LearnedState, LoadWatch, ResistanceBelief};
 use super::motion_bank::SpeedLikelihood;
 use super::motion_filter::{FORCE_DELAY, SPEED, wind_over};
 use super::report::{Systematic, TrainKalmanReport};
 use super::step_builder::StepBuilder;
+use super::weigher::LoadChange;
 use crate::pipeline::judge::{InputState, Judgement, LONG_RUN_MAX};
 use crate::pipeline::momentum::UnitSample;
 use crate::pipeline::motion::{BRIDGED_MAX_S, STANDING_MPS, SpeedRange};

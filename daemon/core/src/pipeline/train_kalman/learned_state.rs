@@ -12,7 +12,7 @@ use super::motion_filter::{
     BRAKE_ERROR, BRAKE_SCALE, COEFFICIENTS, FORCE_DELAY, LOAD, MotionState, RESISTANCE, SPEED,
     StateCovariance, TRACTION_SCALE, WIND,
 };
-use super::weigher::Weigher;
+use super::weigher::{LoadChange, Weigher};
 use crate::pipeline::InnovationMonitor;
 use crate::pipeline::momentum::{regressors, scaled, unscaling};
 use crate::pipeline::motion::{SpeedNoise, StopWatch, is_same_mass};
@@ -166,20 +166,6 @@ impl ResistanceBelief {
 pub fn declared_a_std(train: &dynocar_model::train::TrainModel) -> f64 {
     let relative_std = TrainKalmanSettings::default().prior_relative_std;
     ResistanceBelief::declared(&train.resistance, relative_std).a_std()
-}
-
-/// Change by a sample of the load factor's estimate: the declared mass over the true one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum LoadChange {
-    /// The load factor starts anew, as well known as the declaration allows: a mean and a variance.
-    Anew(f64, f64),
-    /// The load was weighed.
-    Weighed,
-    /// The weigher shows the load of before times this factor, by its noise: no load changes under way.
-    ShownAs(f64),
-    /// The load may have changed by this variance as a share of its square, at most to the uncertainty of any load of
-    /// this mean and variance.
-    Opened { by: f64, mean: f64, variance: f64 },
 }
 
 /// Share by which a learned mass may lie outside a declared range from tare to full: crowded trains, forces a little

@@ -5,6 +5,7 @@ use dynocar_model::train::{Davis, TrainModel};
 
 use super::TrainKalmanSettings;
 use super::learned_state::*;
+use super::weigher::LoadChange;
 
 const SECOND_NS: i64 = 1_000_000_000;
 

@@ -2,12 +2,11 @@
 
 use nalgebra::{Matrix4, Vector3, Vector4};
 
-use super::learned_state::LoadChange;
 use super::motion_filter::{
     BEHAVIOURS, BRAKE_ERROR, DISTURBANCE, FilterStep, LOAD, MAP_ERROR, MapErrorStep, MotionFilter,
     MotionState, RESISTANCE, SPEED, STATES, StateCovariance, WIND, behaviours,
 };
-use super::weigher::Weigher;
+use super::weigher::{LoadChange, Weigher};
 use crate::filter::bank::{Bank, Mixture};
 use crate::filter::{Gaussian, NotPositiveDefinite};
 use crate::pipeline::motion::{OutlierRow, Trust};
@@ -53,6 +52,7 @@ pub struct SpeedLikelihood {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Rival {
     filter: MotionFilter,
+    weigher: Weigher,
     outliers: OutlierRow,
 }
 
@@ -80,8 +80,8 @@ impl MotionBank {
         let rivals = behaviours.map(|behaviour| {
             let mut belief = Gaussian { mean: *mean, covariance: *covariance };
             belief.replace(DISTURBANCE, 0.0, behaviour.std_n_per_kn.powi(2));
-            let filter = MotionFilter { behaviour, belief, weigher, jump_variance: 0.0 };
-            Rival { filter, outliers: OutlierRow::default() }
+            let filter = MotionFilter { behaviour, belief, jump_variance: 0.0 };
+            Rival { filter, weigher, outliers: OutlierRow::default() }
         });
         let mut rivals = Bank::even(rivals, 0.0);
         for ((_, weight), behaviour) in rivals.weighed_mut().zip(behaviours) {
@@ -91,9 +91,9 @@ impl MotionBank {
         MotionBank { rivals }
     }
 
-    /// Changes what is known of the load.
+    /// Changes the belief of the load.
     pub fn change_load(&mut self, change: LoadChange) {
-        for Rival { filter: MotionFilter { belief, weigher, .. }, .. } in
+        for Rival { filter: MotionFilter { belief, .. }, weigher, .. } in
             self.rivals.hypotheses_mut()
         {
             match change {
@@ -113,13 +113,13 @@ impl MotionBank {
     /// Lets a stop pass, after which the weigher's own error is a little another one.
     pub fn age_weigher(&mut self, weighing_variance: f64) {
         let rivals = self.rivals.hypotheses_mut().iter_mut();
-        rivals.for_each(|it| it.filter.weigher.age(weighing_variance));
+        rivals.for_each(|it| it.weigher.age(weighing_variance));
     }
 
     /// Begins a motion at a measured speed with the variance of its noise, after a time in s without a sight of it, of
     /// whose wind and error of the map so much is left.
     pub fn begin(&mut self, speed: (f64, f64), gap_s: f64, wind: (f64, f64), map: &MapErrorStep) {
-        for Rival { filter, outliers } in self.rivals.hypotheses_mut() {
+        for Rival { filter, outliers, .. } in self.rivals.hypotheses_mut() {
             *outliers = OutlierRow::default();
             filter.belief.replace(SPEED, speed.0, speed.1);
             let (keep, renewed) = filter.behaviour.over(gap_s);
@@ -165,7 +165,7 @@ impl MotionBank {
         let is_late = late_std > LATE_UNKNOWN * step.duration_s;
         let mut measured = None;
         for (index, (rival, weight)) in self.rivals.weighed_mut().enumerate() {
-            let Rival { filter, outliers } = rival;
+            let Rival { filter, outliers, .. } = rival;
             let noise_variance = noise_variance + filter.transient_variance(step);
             let before = is_late.then_some(filter.belief);
             let (innovation, trust) =

@@ -3,7 +3,6 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::weigher::Weigher;
 use crate::filter::Gaussian;
 use crate::pipeline::momentum::regressors;
 use crate::pipeline::motion::jump_variance;
@@ -131,8 +130,6 @@ pub struct MotionFilter {
     pub behaviour: Behaviour,
     /// State estimate.
     pub belief: Gaussian<STATES>,
-    /// What weighs the train.
-    pub weigher: Weigher,
     /// Variance in (m/s)² of the speed that the newest step brought by forces that jumped.
     pub jump_variance: f64,
 }
@@ -309,8 +306,7 @@ mod tests {
         let mean =
             MotionState::from([21.0, 0.3, 0.95, 1.6, 0.4, 0.9, 0.01, -0.02, 0.15, -1.2, 0.1, 0.2]);
         let belief = Gaussian { mean, covariance: StateCovariance::zeros() };
-        let weigher = Weigher::new(0.0);
-        MotionFilter { behaviour: behaviours()[0], belief, weigher, jump_variance: 0.0 }
+        MotionFilter { behaviour: behaviours()[0], belief, jump_variance: 0.0 }
     }
 
     /// The speed after a step from a state.

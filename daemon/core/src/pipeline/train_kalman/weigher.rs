@@ -1,13 +1,27 @@
-//! The error of what weighs the train: in part the same at every weighing, in part another one each time.
+//! The error of a load cell or of another weigher: in part the same at every weighing, in part another one each time.
 //!
-//! A load cell that always shows 3 % too much is no new evidence at each stop. Its own error is kept beside the filter, as
-//! what it would be by the load of now and by the scale of the traction: no sample in between changes that, so that it
+//! A load cell that always shows 3 % too much is no new evidence at each stop. Its own error is kept outside the filter, as
+//! a function of the load and of the traction's scale: no sample between two weighings changes that function, so that it
 //! costs work at weighings alone.
 
 use nalgebra::{Matrix2, Vector2};
 
 use super::motion_filter::{LOAD, MotionState, STATES, TRACTION_SCALE};
 use crate::filter::Gaussian;
+
+/// Change by a sample of the load factor's estimate: the declared mass over the true one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LoadChange {
+    /// The load factor starts anew, as well known as the declaration allows: a mean and a variance.
+    Anew(f64, f64),
+    /// The load was weighed.
+    Weighed,
+    /// The weigher shows the load of before times this factor, by its noise: no load changes under way.
+    ShownAs(f64),
+    /// The load may have changed by this variance as a share of its square, at most to the uncertainty of any load of
+    /// this mean and variance.
+    Opened { by: f64, mean: f64, variance: f64 },
+}
 
 /// Variance of the weigher's own error, which is the same at every weighing, as a share of that of a weighing.
 const OWN_SHARE: f64 = 0.5;
@@ -74,7 +88,7 @@ impl Weigher {
             covariance[([LOAD, TRACTION_SCALE][i], [LOAD, TRACTION_SCALE][j])]
         });
         let with = Vector2::new(moments.with[LOAD], moments.with[TRACTION_SCALE]);
-        // What is known exactly tells nothing of the weigher.
+        // A load or a scale that is known exactly tells nothing of the weigher.
         let least = Matrix2::from_diagonal_element(VARIANCE_LEAST);
         let slopes = (both + least).cholesky().map_or(Vector2::zeros(), |it| it.solve(&with));
         let now = Vector2::new(belief.mean[LOAD], belief.mean[TRACTION_SCALE]);
@@ -114,7 +128,7 @@ impl Weigher {
         *self = self.given(&moments, belief);
     }
 
-    /// Learns from the load as it was driven how far its weighing was off beside the weigher's own error.
+    /// Learns from the load as it was driven how far its weighing was off beyond the weigher's own error.
     fn learn(&mut self, moments: &Moments, belief: &Gaussian<STATES>) {
         let error = belief.mean[LOAD] - 1.0 - moments.mean;
         let variance =

@@ -17,7 +17,7 @@ use masses::{Along, FactorPart, Masses, STATION_M, STOP_MIN_S, stations, stops};
 
 /// Greatest number of sections or windows; runs that have another mass as a whole may be half of all.
 const PARTS_MAX: usize = 5;
-/// Whole runs that explain this share of what the best one does are added with it.
+/// Whole runs that explain at least this share of the explanation by the best one are added with it.
 const WITH_BEST_SHARE: f64 = 0.5;
 /// Own factor of a run, in standard deviations of weighed loads, beyond which it is another mass.
 const BEYOND_LOADS: f64 = 2.0;
