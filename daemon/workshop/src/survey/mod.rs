@@ -20,7 +20,6 @@ use serde::Serialize;
 use write::{gradient_entries, late_s, trip_file, write};
 
 use crate::dataset::load;
-use crate::run_facts::impossible;
 
 pub use read::SurveyFailure;
 
@@ -52,9 +51,6 @@ pub fn survey_folder<'s>(
 ) -> Result<Surveyed, SurveyFailure> {
     let source = source.into();
     let raw = load(source)?;
-    if let Some(why) = impossible(&raw) {
-        return Err(SurveyFailure::Impossible(why));
-    }
     let known = line.map(read::known_line).transpose()?;
     let (recordings, vehicle) = (read::recordings(&raw), read::vehicle(&raw));
     let mut survey = survey(&recordings, &vehicle, known.as_ref().map(|(known, _)| known))?;

@@ -187,9 +187,6 @@ pub enum SurveyFailure {
     /// The dataset or the line cannot be read.
     #[error(transparent)]
     Load(#[from] LoadError),
-    /// The recordings cannot be true, and why.
-    #[error("{0}")]
-    Impossible(String),
     /// Nothing can be surveyed in it.
     #[error(transparent)]
     Survey(#[from] SurveyError),

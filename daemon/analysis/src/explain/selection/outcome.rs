@@ -6,7 +6,6 @@ use dynocar_model::terms::masses;
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{Cholesky, DMatrix};
-use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
 use super::deviations::deviations_with_nuisance;
 use crate::explain::effects::{AtBound, SharedHypothesis, policy_of};
@@ -103,8 +102,8 @@ impl NuisanceFit {
         !self.fit.model.effects[index].is_material(parameters, self.fit.theta[2])
     }
 
-    /// Returns whether a change of mass in single runs is the usual scatter of loads: those that differ most deviate no
-    /// more than as many do of as many loads of the usual scatter, or of the larger one that the other runs show.
+    /// Returns whether a change of mass in single runs is the usual scatter of loads: the largest of several deviations
+    /// is about √(2 ln n) of their standard deviation, which is the usual one or the larger one that the other runs show.
     pub(super) fn is_as_loads_are(&self, index: usize) -> bool {
         let fit = &self.fit;
         let effect = &fit.model.effects[index];
@@ -113,21 +112,10 @@ impl NuisanceFit {
         }
         let range = fit.model.ranges()[index].clone();
         let std = deviations_with_nuisance(fit, range.end, self.shared).std;
-        let share = (range.len() as f64 / fit.runs.len() as f64).min(0.5);
-        let largest = mean_square_of_largest(share);
-        // Without the largest of them, loads scatter less than all do.
-        let others = (1.0 - share * largest) / (1.0 - share);
-        let scatter = (fit.noise.scatter.force / others.sqrt()).max(masses::USUAL_STD);
+        let scatter = fit.noise.scatter.force.max(masses::USUAL_STD);
         let away = range.map(|i| (fit.theta[i] - effect.none()) / std[i].hypot(scatter));
-        rms(&away.collect::<Vec<_>>()) < largest.sqrt()
+        rms(&away.collect::<Vec<_>>()) < (2.0 * (fit.runs.len() as f64).ln()).sqrt()
     }
-}
-
-/// Returns the mean square of the largest of many normal deviations by their share, in units of the mean square of all.
-fn mean_square_of_largest(share: f64) -> f64 {
-    let normal = Normal::standard();
-    let least = normal.inverse_cdf(1.0 - 0.5 * share);
-    1.0 + 2.0 * least * normal.pdf(least) / share
 }
 
 /// Result of the search.
