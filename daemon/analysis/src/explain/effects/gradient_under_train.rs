@@ -33,7 +33,7 @@ const CENTRE_HALF_SHARE: f64 = 0.05;
 #[derive(Clone, Debug)]
 enum Cause {
     /// Rounded steps: their addition to the gradient in ‰, and that where trains the other way have another gradient.
-    Rounding { added: Option<StepProfile>, falling: Option<StepProfile> },
+    Rounding { added: Option<Box<StepProfile>>, falling: Option<Box<StepProfile>> },
     /// The centre of mass a metre ahead of the train's middle.
     MassCentre,
 }
@@ -56,9 +56,11 @@ pub fn rounded_steps(
     share: f64,
 ) -> Candidate {
     let curves = usual.times(factor);
+    let added =
+        |steps: Option<&StepProfile>| steps.and_then(|it| curves.added_to(it)).map(Box::new);
     let cause = Cause::Rounding {
-        added: track.gradient().and_then(|steps| curves.added_to(steps)),
-        falling: track.survey.gradient_falling.as_ref().and_then(|steps| curves.added_to(steps)),
+        added: added(track.gradient()),
+        falling: added(track.survey.gradient_falling.as_ref()),
     };
     let own = factor.powi(-2);
     let rounded = UnderTrain {
@@ -167,7 +169,7 @@ mod tests {
     fn a_rounded_step_is_climbed_earlier_and_left_as_early_the_other_way() {
         let steps = [(0.0, 0.0), (1000.0, 8.0)];
         let track = Track::new("line".into(), None, Some(&steps), None, None).unwrap();
-        let added = VerticalCurves::USUAL.added_to(track.gradient().unwrap());
+        let added = VerticalCurves::USUAL.added_to(track.gradient().unwrap()).map(Box::new);
         let train = under_train(&track, 80.0, Cause::Rounding { added, falling: None });
         assert!(train.added_permille(960.0, 1.0) > 0.2);
         assert_eq!(train.added_permille(960.0, -1.0), -train.added_permille(960.0, 1.0));
