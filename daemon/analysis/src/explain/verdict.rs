@@ -288,6 +288,10 @@ fn considered(outcome: &SearchOutcome, competing: &[CompetingHypotheses]) -> Vec
         let reason = format!("certain and small: {}", small(outcome, trial));
         list.push(Considered { kind: trial.kind.name(), evidence: Some(trial.evidence), reason });
     }
+    for trial in outcome.small_or_none_trials() {
+        let reason = "certain and small, but jointly with the usual errors it may be none".into();
+        list.push(Considered { kind: trial.kind.name(), evidence: Some(trial.evidence), reason });
+    }
     for (kind, reason) in &outcome.not_testable {
         list.push(Considered { kind: kind.name(), evidence: None, reason: reason.clone() });
     }

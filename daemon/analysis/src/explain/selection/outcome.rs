@@ -136,7 +136,9 @@ pub struct SearchOutcome {
     pub not_testable: Vec<(EffectKind, String)>,
     /// Kinds that are certain and small: part of the model, and not named.
     pub small: Vec<EffectKind>,
-    /// Where nothing is named: the values of these jointly with the usual errors.
+    /// Where nothing is named: kinds that are certain and small, but may be none jointly with the usual errors.
+    pub(super) small_or_none: Vec<EffectKind>,
+    /// Where nothing is named: the values of the small ones jointly with the usual errors.
     pub(super) small_values: Vec<(EffectKind, Vec<f64>)>,
     /// Kinds that are certain jointly with the usual errors, with all trials that were certain when they were found.
     pub certain: Vec<(EffectKind, SearchRound)>,
@@ -205,11 +207,20 @@ impl SearchOutcome {
 
     /// Returns the trials of effects that are certain and small, from the round that accepted them.
     pub fn small_trials(&self) -> impl Iterator<Item = &EffectTrial> {
+        self.accepted_trials(&self.small)
+    }
+
+    /// Returns those of effects that may be none jointly with the usual errors.
+    pub fn small_or_none_trials(&self) -> impl Iterator<Item = &EffectTrial> {
+        self.accepted_trials(&self.small_or_none)
+    }
+
+    fn accepted_trials(&self, kinds: &[EffectKind]) -> impl Iterator<Item = &EffectTrial> {
         let of = |kind: &EffectKind| {
             let rounds = self.rounds.iter().rev().flat_map(|round| round.iter());
             rounds.clone().find(|trial| trial.kind == *kind)
         };
-        self.small.iter().filter_map(of)
+        kinds.iter().filter_map(of)
     }
 }
 

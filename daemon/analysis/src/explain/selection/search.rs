@@ -79,6 +79,7 @@ impl Search<'_> {
             instead: Vec::new(),
             not_testable: Vec::new(),
             small: Vec::new(),
+            small_or_none: Vec::new(),
             small_values: Vec::new(),
             certain: Vec::new(),
             fallen: Vec::new(),

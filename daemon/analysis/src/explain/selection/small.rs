@@ -110,10 +110,12 @@ impl Search<'_> {
         }
         let joint = self.refit_with_nuisance(outcome);
         let effects = outcome.fit.model.effects.iter().enumerate();
-        let left = effects.filter(|(index, _)| !joint.holds_none(*index));
+        let (none, left): (Vec<_>, Vec<_>) =
+            effects.partition(|(index, _)| joint.holds_none(*index));
         let values = |index: usize| joint.fit.effect_parameters(index).to_vec();
-        outcome.small_values = left.map(|(index, it)| (it.kind(), values(index))).collect();
-        outcome.small = outcome.small_values.iter().map(|it| it.0).collect();
+        outcome.small_values = left.iter().map(|(index, it)| (it.kind(), values(*index))).collect();
+        outcome.small = left.iter().map(|(_, it)| it.kind()).collect();
+        outcome.small_or_none = none.iter().map(|(_, it)| it.kind()).collect();
     }
 
     /// Returns the everyday scales of which little is left jointly with the usual errors: no more than is usual, or the
