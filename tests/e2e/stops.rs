@@ -145,3 +145,35 @@ fn a_modulated_stop_is_reported_with_what_it_holds_and_gives_no_law() {
     let words = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert!(words.contains("no run to fit holds a stop by all of the brake"), "{words}");
 }
+
+#[test]
+fn a_speed_of_one_sample_that_its_neighbours_contradict_is_no_stop() {
+    let (clean, _) = recording(1.0, 30.0);
+    let faulty = |(line, row): (usize, &str)| match line {
+        0 => row.to_owned(),
+        _ if line % 41 == 0 => replaced(row, "0"),
+        _ if line % 43 == 0 => replaced(row, "359.9"),
+        _ => row.to_owned(),
+    };
+    let rows: Vec<String> = clean.lines().enumerate().map(faulty).collect();
+    for columns in [COLUMNS, "speed = { column = \"v\", unit = \"km/h\" }\n"] {
+        let answer = |text: &str| -> Value {
+            let output = stops(&site(&[("fit", text.to_owned())], columns), &["--json", "-"]);
+            assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+            serde_json::from_slice(&output.stdout).unwrap()
+        };
+        let (of_clean, of_faulty) = (answer(&clean), answer(&rows.join("\n")));
+        let stops = |answer: &Value| answer["stops"].as_array().unwrap().clone();
+        assert_eq!((stops(&of_clean).len(), stops(&of_faulty).len()), (1, 1));
+        let metres = |answer: &Value| stops(answer)[0]["distance_m"].as_f64().unwrap();
+        let ratio = metres(&of_faulty) / metres(&of_clean);
+        assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
+    }
+}
+
+/// Returns a row with another speed.
+fn replaced(row: &str, speed: &str) -> String {
+    let mut cells: Vec<&str> = row.split(',').collect();
+    cells[1] = speed;
+    cells.join(",")
+}

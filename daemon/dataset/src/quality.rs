@@ -192,7 +192,7 @@ fn of_forces(run: &Resolved, count: impl Fn(&Force) -> usize) -> Vec<(Quantity, 
 
 fn outliers(run: &Resolved) -> Vec<QuantityCount> {
     let marked = |marks: &[bool]| marks.iter().filter(|&&mark| mark).count();
-    let mut all = vec![(Quantity::Speed, marked(&run.speeds.is_spike))];
+    let mut all = vec![(Quantity::Speed, run.speeds.outliers().count())];
     all.extend(of_forces(run, |force| marked(&force.is_spike) + force.handle_out_of_range));
     counts(all)
 }

@@ -67,6 +67,8 @@ pub struct Run {
     /// that are missing by the time that passed, so that they count as lost. Rows out of order
     /// or repeated are kept for validation to refuse and count.
     pub samples: Vec<TrainSample>,
+    /// Places in `samples`, in order, of those whose speed sticks out from its neighbours.
+    pub speed_outliers: Vec<usize>,
     /// Those of [`EXTRAS`] that are recorded.
     pub extras: Vec<(Quantity, QuantitySeries)>,
     /// Where the positions come from.
@@ -248,6 +250,7 @@ pub(super) fn read(
         traction_source: resolved.forces.traction.source,
         brake_source: resolved.forces.brake.source,
         samples,
+        speed_outliers: resolved.speeds.outliers().collect(),
         balance: judge.balance(),
         mirrored: judge.mirrored(),
         gradient_unit: read_as(context.manifest, InputFault::GradientScale),

@@ -54,6 +54,11 @@ impl Speeds {
         let is_spike = spikes::<5>(&speed_mps, &order.in_order, least);
         Speeds { speed_mps, is_spike, zeroed, negative }
     }
+
+    /// Returns the rows of the outliers, in order.
+    pub fn outliers(&self) -> impl Iterator<Item = usize> {
+        (0..self.is_spike.len()).filter(|&row| self.is_spike[row])
+    }
 }
 
 /// Where a run's positions start and which way they grow.

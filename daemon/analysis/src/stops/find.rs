@@ -69,11 +69,15 @@ pub struct StopSpan {
     pub found_by: FoundBy,
 }
 
-/// Returns the samples with a speed, each later than the one before, with the standstills that a pausing recorder left
-/// out.
-pub fn usable(samples: &[TrainSample]) -> Vec<TrainSample> {
+/// Returns the samples with a speed, without those at the places of outliers, each later than the one before, with the
+/// standstills that a pausing recorder left out.
+pub fn usable(samples: &[TrainSample], outliers: &[usize]) -> Vec<TrainSample> {
     let mut usable: Vec<TrainSample> = Vec::with_capacity(samples.len());
-    for sample in samples.iter().filter(|it| it.speed_mps.is_finite()) {
+    let is_outlier = |place: usize| outliers.binary_search(&place).is_ok();
+    let regular = samples.iter().enumerate().filter(|(place, _)| !is_outlier(*place));
+    for sample in
+        regular.map(|(_, sample)| sample).filter(|it| it.get(SampleField::Speed).is_some())
+    {
         if let Some(&last) = usable.last() {
             if sample.time_ns <= last.time_ns {
                 continue;

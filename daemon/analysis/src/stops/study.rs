@@ -86,7 +86,7 @@ fn found_in(
     run: &Run,
     settings: &StudySettings,
 ) -> Vec<(RecordedStop, DecelerationCurve)> {
-    let mut all = usable(&run.samples);
+    let mut all = usable(&run.samples, &run.speed_outliers);
     let stops = find(&all, dataset.train.brake.as_ref(), &settings.find);
     for stop in stops.iter().filter(|it| it.found_by == FoundBy::Speed) {
         all[*stop.samples.start()].time_ns = began_ns(&all[stop.samples.clone()]);
@@ -210,7 +210,8 @@ fn cannot_tell(
         ));
     }
     let runs = datasets.iter().flat_map(|dataset| &dataset.runs);
-    let ends = runs.filter_map(|run| run.samples.iter().rev().find(|it| it.speed_mps.is_finite()));
+    let ends = runs
+        .filter_map(|run| run.samples.iter().rev().find(|it| it.get(SampleField::Speed).is_some()));
     let moving = ends.filter(|it| it.speed_mps > STANDING_MPS).count();
     if moving > 0 {
         said.push(format!("how runs go on that end while the train moves: {moving}"));
