@@ -6,6 +6,7 @@ use dynocar_model::train::PowerTrain;
 use toml::Value;
 
 use super::clock_faults::HALF_DAY_S;
+use super::column_faults::column_faults;
 use super::diagnostic::{Diagnostic, implausible_columns, read_as};
 use super::force_faults::force_faults;
 use super::forces::{Force, ForceSource};
@@ -76,6 +77,7 @@ pub(super) fn diagnostics(
         diagnostics.push(Diagnostic::new("gradient_unknown", Info, text, []));
     }
     diagnostics.extend(implausible_columns(run));
+    diagnostics.extend(column_faults(run));
     diagnostics.extend(force_faults(context, run));
     diagnostics
 }

@@ -18,6 +18,7 @@
 //! - `lines`, `header`, `cell`, `table`: a CSV file as columns of numbers
 //! - [`trains`]: files that hold several trains
 //! - `clock_faults`: times with an hour of summer time, seconds without a fraction, rows in another order
+//! - [`chainage`], `fill_values`: positions that leap, and numbers in the place of missing values
 //! - `order`, `speed_and_position`, `forces`, `altitude`: from columns to time, speed, position, forces and gradient
 //! - `resolved`, [`run`], [`quality`], [`diagnostic`], [`dataset_diagnostic`], `diagnosing`: samples,
 //!   counts and warnings
@@ -26,14 +27,17 @@
 
 mod altitude;
 mod cell;
+pub mod chainage;
 pub mod clock;
 mod clock_faults;
+mod column_faults;
 mod corrections;
 pub mod dataset_diagnostic;
 mod diagnosing;
 pub mod diagnostic;
 pub mod document;
 pub mod error;
+mod fill_values;
 mod force_faults;
 mod forces;
 pub mod format;

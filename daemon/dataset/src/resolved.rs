@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use super::altitude::{self, Recorded};
 use super::clock_faults::{self, ClockFaults};
+use super::fill_values::{self, FillValue};
 use super::forces::Forces;
 use super::manifest::{Manifest, RunEntry};
 use super::order::TimeOrder;
@@ -52,6 +53,7 @@ pub(super) struct Resolved<'d> {
     pub times_s: Vec<f64>,
     pub order: TimeOrder,
     pub clock_faults: ClockFaults,
+    pub fill_values: Vec<FillValue>,
     pub rows_without_time: usize,
     pub speeds: Speeds,
     pub forces: Forces,
@@ -65,6 +67,7 @@ impl<'d> Resolved<'d> {
     pub fn new(context: Context<'d>, entry: &'d RunEntry, mut table: Table) -> Self {
         let (mut timeless_before, rows_without_time) = drop_timeless(&mut table);
         let clock_faults = mend_times(&mut table, &mut timeless_before);
+        let fill_values = fill_values::take_out(&mut table, context.manifest);
         table.hold_last(Quantity::Passengers);
         let column = |quantity| table.column(quantity).unwrap_or_default();
         let times_s = column(Quantity::Time).to_vec();
@@ -91,6 +94,7 @@ impl<'d> Resolved<'d> {
             times_s,
             order,
             clock_faults,
+            fill_values,
             rows_without_time,
             speeds,
             forces,

@@ -5,6 +5,7 @@ use dynocar_shared::{RejectionReason, SampleField};
 use super::*;
 
 mod arbitrary;
+mod columns;
 mod lacking;
 
 const TRAIN: &str = "[train]\nmass_t=100\nlength_m=80\nrotating_mass_factor=0.05\n\

@@ -1,0 +1,44 @@
+//! Faults of whole columns and of runs that hold the same.
+
+use super::*;
+
+/// Returns a run of 400 s at 5 Hz, with a gradient and a position by time in s.
+fn driven(gradient: impl Fn(f64) -> f64, position_m: impl Fn(f64, f64) -> f64) -> Example {
+    let mut true_m = 1000.0;
+    let row = |fifth: u32| {
+        let time_s = 0.2 * f64::from(fifth);
+        let speed_mps = 15.0 + 5.0 * (0.05 * time_s).sin();
+        true_m += 0.2 * speed_mps;
+        format!(
+            "{time_s:.1},{speed_mps:.3},{},{:.1}\n",
+            gradient(time_s),
+            position_m(time_s, true_m)
+        )
+    };
+    let csv = "t,v,i,s\n".to_owned() + &(0..2000).map(row).collect::<String>();
+    Example::new(&[["gradient", "i", "permille"], ["position", "s", "m"]], &csv)
+}
+
+fn texts(run: &Run, code: &str) -> Vec<String> {
+    run.diagnostics.iter().filter(|it| it.code == code).map(ToString::to_string).collect()
+}
+
+#[test]
+fn a_number_in_the_place_of_missing_values_is_named_and_not_used() {
+    let slope = |time_s: f64| (6.0 * (0.01 * time_s).sin()).round();
+    let filled = |time_s: f64| if time_s % 10.0 < 0.9 { 99.0 } else { slope(time_s) };
+    let run = driven(filled, |time_s, true_m| if time_s < 40.0 { 0.0 } else { true_m }).run();
+    let named = texts(&run, "fill_value");
+    assert_eq!(
+        named,
+        [
+            "column 'i' holds 99 in 200 rows, apart from its other values, -5 to 6: taken for missing values of \
+             gradient; leave such cells empty in the file",
+            "column 's' holds 0 in 200 rows, apart from its other values, 1745.1 to 7058.7: taken for missing values \
+             of position; leave such cells empty in the file",
+        ]
+    );
+    let missing = |of| field(&run, of).iter().filter(|it| it.is_none()).count();
+    assert_eq!((missing(SampleField::Gradient), missing(SampleField::Position)), (200, 200));
+    assert!(texts(&driven(slope, |_, true_m| true_m).run(), "fill_value").is_empty());
+}
