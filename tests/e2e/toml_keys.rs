@@ -15,7 +15,7 @@ const TABLE: [&str; 4] = [
 const OTHERS: [(&str, &str); 11] = [
     ("daemon/analysis/src/explain/", "a parameter of the answer, or advice in it"),
     ("daemon/core/src/plausibility/input_fault.rs", "a fault"),
-    ("daemon/dataset/src/diagnosing.rs", "a figure of a note"),
+    ("daemon/dataset/src/position_faults.rs", "a figure of a note"),
     ("daemon/model/src/terms/", "a parameter of the answer"),
     ("daemon/model/src/words.rs", "a parameter of the answer"),
     ("daemon/src/config/apart.rs", "a key of daemon.toml"),

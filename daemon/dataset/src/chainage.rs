@@ -8,9 +8,13 @@ const LEAP_M: f64 = 100.0;
 /// Greatest share of the way since the last correction that a wheel's diameter lets an odometer miss...
 const WHEEL_SHARE: f64 = 0.03;
 /// ... where balises, this many m apart, correct it.
-const BETWEEN_BALISES_M: f64 = 3000.0;
+const BETWEEN_BALISES_M: f64 = 2000.0;
 /// A position that leaves the integrated speed by more than this in m was corrected.
 pub const CORRECTION_MIN_M: f64 = 1.0;
+/// Steps within which an outlier comes back.
+const AWAY_STEPS: usize = 10;
+/// More breaks than these in a run are none.
+const BREAKS_MAX: usize = 5;
 /// Quantile of the changes of position that counts as the step of a coarse one, and how many steps a leap takes.
 const COARSE: (f64, f64) = (0.9, 3.0);
 /// Positions that move on from a leap in this many rows stay there.
@@ -20,36 +24,54 @@ const SPARE: f64 = 1.5;
 /// The speed in m/s that a train may have where none is recorded.
 const UNKNOWN_MPS: f64 = 60.0;
 
-/// Judge of the steps of a position, one after the other.
-#[derive(Clone, Copy, Debug)]
-pub struct Chainage {
-    /// Step of a coarse position in m.
-    coarse_m: f64,
-    /// Way in m since the last correction.
-    way_m: f64,
+/// Returns the places of the steps in which the chainage breaks, of all steps of a run by position and by integrated
+/// speed, in m of travel. Where it seems to break often, position or speed is in another unit: none is returned.
+pub fn breaks(steps_m: &[(f64, f64)]) -> Vec<usize> {
+    let leaps = leaps(steps_m);
+    let leap_m = leap_m(coarse_m(steps_m.iter().map(|step| step.0)));
+    // A position that comes back was an outlier; one at an end may be.
+    let is_near = |one: &(usize, f64), next: &(usize, f64)| next.0 - one.0 <= AWAY_STEPS;
+    let stays = |leaps: &&[(usize, f64)]| {
+        let jump_m: f64 = leaps.iter().map(|leap| leap.1).sum();
+        let within = AWAY_STEPS..steps_m.len().saturating_sub(AWAY_STEPS);
+        jump_m.abs() > leap_m && leaps.iter().all(|leap| within.contains(&leap.0))
+    };
+    let found = leaps.chunk_by(is_near).filter(stays).flatten();
+    let found: Vec<usize> = found.map(|leap| leap.0).collect();
+    if found.len() > BREAKS_MAX { Vec::new() } else { found }
 }
 
-impl Chainage {
-    /// Returns a judge of positions that change by these m from one to the next.
-    pub fn of_steps(steps_m: impl Iterator<Item = f64>) -> Self {
-        let mut sizes: Vec<f64> = steps_m.map(f64::abs).filter(|it| *it > 0.0).collect();
-        let coarse_m = quantile(&mut sizes, COARSE.0).unwrap_or(0.0);
-        Chainage { coarse_m, way_m: 0.0 }
+/// Returns the steps in which the position leaps away from the integrated speed, each with its place and by how many m.
+fn leaps(steps_m: &[(f64, f64)]) -> Vec<(usize, f64)> {
+    let coarse_m = coarse_m(steps_m.iter().map(|step| step.0));
+    // The way since the last correction, and that on which the position was kept.
+    let (mut way_m, mut kept_m) = (0.0_f64, 0.0);
+    let mut found = Vec::new();
+    for (place, &(by_position_m, by_speed_m)) in steps_m.iter().enumerate() {
+        kept_m += by_speed_m;
+        if by_position_m == 0.0 {
+            continue;
+        }
+        let missed_m = (by_position_m - kept_m).abs().min((by_position_m - by_speed_m).abs());
+        if missed_m > leap_m(coarse_m) + WHEEL_SHARE * way_m.min(BETWEEN_BALISES_M) {
+            found.push((place, by_position_m - by_speed_m));
+        }
+        let is_corrected = missed_m > CORRECTION_MIN_M.max(coarse_m);
+        way_m = if is_corrected { 0.0 } else { way_m + kept_m };
+        kept_m = 0.0;
     }
+    found
+}
 
-    /// Returns how far in m the position may leave the integrated speed in the next step.
-    fn leap_m(&self) -> f64 {
-        LEAP_M + COARSE.1 * self.coarse_m + WHEEL_SHARE * self.way_m.min(BETWEEN_BALISES_M)
-    }
+/// Returns the step in m of a coarse position, from its changes from row to row.
+fn coarse_m(changes_m: impl Iterator<Item = f64>) -> f64 {
+    let mut sizes: Vec<f64> = changes_m.map(f64::abs).filter(|it| *it > 0.0).collect();
+    quantile(&mut sizes, COARSE.0).unwrap_or(0.0)
+}
 
-    /// Takes a step by position and by integrated speed, in m of travel; returns whether the chainage breaks in it.
-    pub fn breaks(&mut self, by_position_m: f64, by_speed_m: f64) -> bool {
-        let missed_m = (by_position_m - by_speed_m).abs();
-        let is_break = missed_m > self.leap_m();
-        let is_corrected = missed_m > CORRECTION_MIN_M.max(self.coarse_m);
-        self.way_m = if is_corrected { 0.0 } else { self.way_m + by_speed_m };
-        is_break
-    }
+/// Returns how far in m a position with these steps may leave the integrated speed at once.
+fn leap_m(coarse_m: f64) -> f64 {
+    LEAP_M + COARSE.1 * coarse_m
 }
 
 /// Returns the rows whose position leaps away and comes back, or is held at 0 until the first fix or from the last one
@@ -57,10 +79,10 @@ impl Chainage {
 pub(super) fn away(times_s: &[f64], position_m: &[f64], speed_mps: &[f64]) -> Vec<usize> {
     let rows: Vec<usize> = (0..position_m.len()).filter(|&row| !position_m[row].is_nan()).collect();
     let steps = rows.windows(2).map(|it| position_m[it[1]] - position_m[it[0]]);
-    let judge = Chainage::of_steps(steps);
+    let leap_m = leap_m(coarse_m(steps));
     let way_m = way_m(times_s, speed_mps);
     let is_near = |from: usize, to: usize| {
-        let most_m = SPARE * (way_m[to] - way_m[from]) + judge.leap_m();
+        let most_m = SPARE * (way_m[to] - way_m[from]) + leap_m;
         (position_m[to] - position_m[from]).abs() <= most_m
     };
     let mut found = Vec::new();
@@ -150,9 +172,24 @@ mod tests {
 
     #[test]
     fn a_break_is_more_than_an_odometer_misses_between_balises() {
-        let mut judge = Chainage::of_steps([4.0; 100].into_iter());
-        assert!((0..500).all(|_| !judge.breaks(4.0, 4.0)));
-        assert!(!judge.breaks(4.0 + 60.0, 4.0), "a balise after 2 km, with wheels 3 % off");
-        assert!(judge.breaks(4.0 + 200.0, 4.0) && judge.breaks(4.0 - 300.0, 4.0));
+        let steps = |jumps_m: &[(usize, f64)]| {
+            let mut steps = vec![(4.0, 4.0); 1000];
+            jumps_m.iter().for_each(|&(place, jump_m)| steps[place].0 += jump_m);
+            breaks(&steps)
+        };
+        assert_eq!(steps(&[]), []);
+        assert_eq!(steps(&[(500, 60.0)]), [], "a balise after 2 km, with wheels 3 % off");
+        assert_eq!(steps(&[(500, 200.0), (700, -300.0)]), [500, 700]);
+        let often: Vec<(usize, f64)> = (1..9).map(|place| (100 * place, 500.0)).collect();
+        assert_eq!(steps(&often), [], "another unit");
+        assert_eq!(
+            steps(&[(500, 700.0), (501, -700.0), (600, 300.0), (602, -290.0)]),
+            [],
+            "outliers"
+        );
+        let mut kept = vec![(4.0, 4.0); 1000];
+        kept[400..600].fill((0.0, 4.0));
+        kept[600].0 = 804.0;
+        assert_eq!(breaks(&kept), [], "a receiver that held its last fix");
     }
 }

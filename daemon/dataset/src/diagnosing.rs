@@ -1,7 +1,7 @@
 //! Search for the diagnostics of a run.
 
+use dynocar_core::plausibility::{DetectedFault, DetectedFaults};
 use dynocar_core::plausibility::Severity::{Fundamental, Info, Warning};
-use dynocar_core::plausibility::{DetectedFault, DetectedFaults, InputFault};
 use dynocar_model::train::PowerTrain;
 use toml::Value;
 
@@ -10,18 +10,11 @@ use super::column_faults::column_faults;
 use super::diagnostic::{Diagnostic, implausible_columns, read_as};
 use super::force_faults::force_faults;
 use super::forces::{Force, ForceSource};
-use super::keys::run::DIRECTION;
+use super::position_faults::of_position;
 use super::quality::RunQuality;
 use super::quantity::Quantity;
 use super::resolved::{Context, GradientSource, Resolved};
-use super::speed_and_position::{DISTANCE_MIN_M, PositionSource, leap_m, turn};
 
-/// Number of rows at either end that show where a run begins and ends.
-const END_ROWS: usize = 5;
-/// Greatest relative difference between position and integrated speed, by wheel wear, balises and gaps.
-const DISTANCE_TOLERANCE: f64 = 0.05;
-/// Distance in m beyond the line's ends within which a train's end may be.
-const LINE_TOLERANCE_M: f64 = 50.0;
 /// Usual median time steps in s of recordings.
 const USUAL_STEP_S: (f64, f64) = (0.0005, 60.0);
 
@@ -258,92 +251,6 @@ fn stands_still(run: &Resolved) -> Option<Diagnostic> {
     let figures =
         [("from_s", from_s.into()), ("for_s", for_s.into()), ("speed_mps", speed_mps.into())];
     Some(Diagnostic::new("stands_still", Warning, text, figures))
-}
-
-fn of_position(
-    context: Context,
-    run: &Resolved,
-    quality: &RunQuality,
-    detected: &DetectedFaults,
-    diagnostics: &mut Vec<Diagnostic>,
-) {
-    if run.position_source == PositionSource::IntegratedSpeed {
-        if context.track.is_some() && run.entry.start_m.is_none() {
-            let text = "no position is recorded: it is integrated from 0 m; give the run's start_m \
-                        to place it on the line";
-            diagnostics.push(Diagnostic::new("start_unknown", Info, text, []));
-        }
-        of_line(context, quality, diagnostics);
-        return;
-    }
-    let positions = run.order.rows().map(|row| run.position_m[row]).filter(|it| !it.is_nan());
-    let count = positions.clone().count();
-    if count < 2 {
-        return;
-    }
-    // The medians of a few rows, since a row at an end may be an outlier; of so few that the way
-    // between them is the run's.
-    let few = END_ROWS.min(count / 100).max(1);
-    let median_m = |mut positions: Vec<f64>| {
-        positions.sort_by(f64::total_cmp);
-        positions[(positions.len() - 1) / 2]
-    };
-    let (first, last) = (positions.clone().take(few), positions.clone().rev().take(few));
-    let (first_m, last_m) = (median_m(first.collect()), median_m(last.collect()));
-    let net_m = last_m - first_m - leap_m(positions);
-    let direction = run.entry.direction;
-    let is_reported =
-        |faults: &[InputFault]| detected.iter().any(|detected| faults.contains(&detected.fault));
-    if net_m * f64::from(direction) < -DISTANCE_MIN_M
-        && !is_reported(&[InputFault::DirectionReversed])
-    {
-        let declared = DIRECTION.assign(direction);
-        let text = format!("the position changes by {net_m:.0} m in all, against {declared}");
-        let figures = [("direction", Value::from(direction)), ("net_m", net_m.into())];
-        diagnostics.push(Diagnostic::new("against_direction", Fundamental, text, figures));
-    }
-    let (position_m, speed_m) = (net_m.abs(), quality.distance_m);
-    let is_long = position_m.max(speed_m) > DISTANCE_MIN_M;
-    let is_mismatch_reported =
-        is_reported(&[InputFault::TimeScale, InputFault::SpeedScale, InputFault::PositionScale]);
-    let is_off = |position_m: f64| {
-        (position_m - speed_m).abs() > DISTANCE_TOLERANCE * position_m.max(speed_m)
-    };
-    let turned = quality.position_range_m.and_then(|range_m| turn(range_m, [first_m, last_m]));
-    let turned = turned.filter(|(_, there_and_back_m)| !is_off(*there_and_back_m));
-    if let Some((turn_m, _)) = turned.filter(|_| is_off(position_m)) {
-        let text = format!(
-            "the train goes to {turn_m:.0} m and back, but a run has one direction: make a file of \
-             each way, with its own direction"
-        );
-        diagnostics.push(Diagnostic::new("turns_back", Warning, text, [("turn_m", turn_m.into())]));
-    } else if !is_mismatch_reported && is_long && is_off(position_m) {
-        let text = format!(
-            "the position covers {position_m:.0} m, the integrated speed {speed_m:.0} m (ratio \
-             {:.3}): are the units of time, position and speed right?",
-            position_m / speed_m
-        );
-        let figures = [("position_m", position_m.into()), ("speed_m", speed_m.into())];
-        diagnostics.push(Diagnostic::new("distance_mismatch", Warning, text, figures));
-    }
-    of_line(context, quality, diagnostics);
-}
-
-/// Adds the diagnostic of positions outside the line.
-fn of_line(context: Context, quality: &RunQuality, diagnostics: &mut Vec<Diagnostic>) {
-    let length_m = context.track.and_then(|track| track.length_m);
-    // A train may stop with its head at the line's end and its centre half a length outside.
-    let beyond_m = LINE_TOLERANCE_M + 0.5 * context.train.length_m;
-    if let (Some(length_m), Some((from_m, to_m))) = (length_m, quality.position_range_m)
-        && (from_m < -beyond_m || to_m > length_m + beyond_m)
-    {
-        let text = format!(
-            "positions from {from_m:.0} m to {to_m:.0} m leave the line, 0 m to {length_m:.0} m"
-        );
-        let figures =
-            [("from_m", from_m.into()), ("to_m", to_m.into()), ("length_m", length_m.into())];
-        diagnostics.push(Diagnostic::new("off_the_line", Warning, text, figures));
-    }
 }
 
 fn of_force(

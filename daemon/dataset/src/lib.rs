@@ -48,6 +48,7 @@ mod lines;
 pub mod manifest;
 pub mod node;
 mod order;
+mod position_faults;
 pub mod quality;
 pub mod quantity;
 mod resolved;

@@ -18,6 +18,9 @@ const END_ROWS: usize = 5;
 const DISTANCE_TOLERANCE: f64 = 0.05;
 /// Distance in m beyond the line's ends within which a train's end may be.
 const LINE_TOLERANCE_M: f64 = 50.0;
+/// Over a longer time in s, and in usual steps, the speed does not show the way.
+const PAUSE_S: f64 = 10.0;
+const PAUSE_STEPS: f64 = 3.0;
 
 /// Adds the diagnostics of a run's positions.
 pub(super) fn of_position(
@@ -116,11 +119,12 @@ fn breaks(run: &Resolved) -> Vec<(usize, f64)> {
         let is_there = !run.position_m[*row].is_nan() && !speeds.speed_mps[*row].is_nan();
         is_there && !speeds.is_spike[*row]
     };
+    let longest_s = PAUSE_S.max(PAUSE_STEPS * run.order.counts.step_s);
     let step = |(from, to): (usize, usize)| {
         let step_s = run.times_s[to] - run.times_s[from];
         let way_m = 0.5 * (speeds.speed_mps[from] + speeds.speed_mps[to]) * step_s;
         let moved_m = direction * (run.position_m[to] - run.position_m[from]);
-        (!run.order.counts.is_gap(step_s)).then_some((to, (moved_m, way_m)))
+        (step_s <= longest_s).then_some((to, (moved_m, way_m)))
     };
     let rows = run.order.rows().filter(is_good);
     let (ends, steps_m): (Vec<usize>, Vec<(f64, f64)>) = pairs(rows).filter_map(step).unzip();

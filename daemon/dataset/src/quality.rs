@@ -1,6 +1,7 @@
 //! Quality of a run's data: counts, ranges, the train's motion, and the refusals by the admission that also checks live
 //! samples.
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use dynocar_core::pipeline::admission::Admission;
@@ -148,7 +149,7 @@ pub(super) fn assess(run: &Resolved, samples: &[TrainSample], judge: &Judge) -> 
         speed_range_mps: range(speeds),
         position_range_m: range(run.position_m.iter().copied()),
         mass_kg: spread(samples.iter().filter_map(|sample| sample.get(SampleField::Mass))),
-        distance_m: distance_m(run),
+        distance_m: distance_m(run, 0..=usize::MAX),
         phases: phases(run),
     }
 }
@@ -218,9 +219,12 @@ fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     })
 }
 
-/// Returns the integral of the speed over the rows in order, by trapezoids between good speeds.
-fn distance_m(run: &Resolved) -> f64 {
-    let is_good = |row: &usize| !run.speeds.speed_mps[*row].is_nan() && !run.speeds.is_spike[*row];
+/// Returns the integral of the speed over the rows in order within some, by trapezoids between good speeds.
+pub(super) fn distance_m(run: &Resolved, within: RangeInclusive<usize>) -> f64 {
+    let speeds = &run.speeds;
+    let is_good = |row: &usize| {
+        within.contains(row) && !speeds.speed_mps[*row].is_nan() && !speeds.is_spike[*row]
+    };
     pairs(run.order.rows().filter(is_good))
         .map(|(from, to)| {
             let mean_mps = 0.5 * (run.speeds.speed_mps[from] + run.speeds.speed_mps[to]);

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::manifest::PositionReference;
-use super::order::{TimeOrder, quantile};
+use super::order::TimeOrder;
 
 /// Distance in m below which comparisons of position and speed say nothing.
 pub(super) const DISTANCE_MIN_M: f64 = 200.0;
@@ -194,17 +194,6 @@ pub(super) fn turn((low_m, high_m): (f64, f64), ends_m: [f64; 2]) -> Option<(f64
     let far =
         ways.into_iter().filter(is_far).map(|(turn_m, [out_m, back_m])| (turn_m, out_m + back_m));
     far.max_by(|one, other| one.1.total_cmp(&other.1))
-}
-
-/// Returns the leap in m from a position that a receiver held before its first fix; 0 without one.
-pub(super) fn leap_m(positions: impl Iterator<Item = f64>) -> f64 {
-    let positions: Vec<f64> = positions.collect();
-    let held = positions.iter().take_while(|it| **it == positions[0]).count();
-    let Some(&fixed_m) = positions.get(held).filter(|_| positions[0] == 0.0) else { return 0.0 };
-    let mut steps: Vec<f64> =
-        positions[held..].windows(2).map(|it| (it[1] - it[0]).abs()).collect();
-    let usual_m = quantile(&mut steps, 0.9).unwrap_or(0.0);
-    if fixed_m.abs() > DISTANCE_MIN_M + 10.0 * usual_m { fixed_m } else { 0.0 }
 }
 
 #[cfg(test)]

@@ -40,5 +40,17 @@ fn a_number_in_the_place_of_missing_values_is_named_and_not_used() {
     );
     let missing = |of| field(&run, of).iter().filter(|it| it.is_none()).count();
     assert_eq!((missing(SampleField::Gradient), missing(SampleField::Position)), (200, 200));
+    assert!(
+        texts(&run, "distance_mismatch").is_empty() && texts(&run, "chainage_break").is_empty()
+    );
     assert!(texts(&driven(slope, |_, true_m| true_m).run(), "fill_value").is_empty());
+}
+
+#[test]
+fn a_break_of_the_chainage_is_named_and_no_other_unit() {
+    let run =
+        driven(|_| 0.0, |time_s, true_m| true_m + if time_s < 200.0 { 0.0 } else { 800.0 }).run();
+    let named = texts(&run, "chainage_break");
+    assert!(named[0].starts_with("the position jumps by 800 m in line 1002: "), "{named:?}");
+    assert!(texts(&run, "distance_mismatch").is_empty());
 }

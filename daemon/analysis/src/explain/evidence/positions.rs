@@ -9,6 +9,7 @@ use dynocar_model::terms::speed_delay;
 use nalgebra::{Matrix3, Vector3};
 
 use super::bins::SEGMENT_GAP_MAX_S;
+use crate::dataset::chainage;
 
 /// Distance by position over distance by integrated speed, and its standard deviation.
 ///
@@ -35,10 +36,10 @@ pub(super) fn distance_ratio(recording: &OpenLoopRecording) -> Option<(f64, f64)
     ))
 }
 
+/// A position that leaves the integrated speed by more than this in m was corrected.
+pub(super) const CORRECTION_MIN_M: f64 = chainage::CORRECTION_MIN_M;
 /// Usual error of a position in m where a run begins and ends, and at a balise.
 pub(super) const END_ERROR_M: f64 = 10.0;
-/// A position that leaves the integrated speed by more than this in m was corrected.
-pub(super) const CORRECTION_MIN_M: f64 = 1.0;
 /// A shorter way in m shows nothing of the wheels.
 pub(super) const DISTANCE_MIN_M: f64 = 1500.0;
 
@@ -70,8 +71,22 @@ pub(super) fn between_corrections(steps: &[Distances]) -> &[Distances] {
     steps.get(first..end).unwrap_or_default()
 }
 
-/// The distances between samples with a position.
+/// The distances between samples with a position, without those over a break of the chainage.
 pub(super) fn distances(recording: &OpenLoopRecording) -> Vec<Distances> {
+    let all = all_distances(recording);
+    let breaks = breaks(&all);
+    let kept = all.iter().enumerate().filter(|(place, _)| breaks.binary_search(place).is_err());
+    kept.map(|(_, step)| *step).collect()
+}
+
+/// The places among all distances over which the chainage breaks.
+fn breaks(all: &[Distances]) -> Vec<usize> {
+    let steps_m: Vec<(f64, f64)> = all.iter().map(|it| (it.by_position_m, it.by_speed_m)).collect();
+    chainage::breaks(&steps_m)
+}
+
+/// The distances between samples with a position.
+fn all_distances(recording: &OpenLoopRecording) -> Vec<Distances> {
     let (samples, time_s) = (recording.samples(), recording.time_s());
     let mut distances = Vec::with_capacity(samples.len());
     let mut last: Option<(usize, f64)> = None;
@@ -106,10 +121,13 @@ const AHEAD_STDS: f64 = 2.0;
 /// stand.
 pub(super) fn by_part_s(recording: &OpenLoopRecording) -> Vec<f64> {
     let (samples, time_s) = (recording.samples(), recording.time_s());
+    let all = all_distances(recording);
+    let breaks: Vec<usize> = breaks(&all).into_iter().map(|place| all[place].to).collect();
     let mut parts = Vec::new();
     let mut from = 0;
     for i in 1..=samples.len() {
         let is_end = i == samples.len()
+            || breaks.binary_search(&i).is_ok()
             || samples[i].speed_mps <= STANDING_MPS
             || samples[i].position_m.is_none()
             || time_s[i] - time_s[i - 1] > SEGMENT_GAP_MAX_S;
@@ -198,6 +216,18 @@ mod tests {
         // 3 km before the first and 2.5 km behind the last, of 10 km.
         let (ratio, _) = distance_ratio(&recording(&[3001.0, 5001.0, 7501.0])).unwrap();
         assert!((ratio * SCALE - 1.0).abs() < 1e-9, "{ratio}");
+    }
+
+    #[test]
+    fn a_break_of_the_chainage_shows_nothing_of_the_wheels() {
+        for jump_m in [-400.0, 200.0, 3000.0] {
+            let mut samples = recording(&[]).samples().to_vec();
+            for sample in &mut samples[1700..] {
+                sample.position_m = sample.position_m.map(|it| it + jump_m);
+            }
+            let (ratio, _) = distance_ratio(&OpenLoopRecording::new(samples).unwrap()).unwrap();
+            assert!((ratio - 1.0).abs() < 1e-9, "{jump_m} m: {ratio}");
+        }
     }
 
     #[test]
