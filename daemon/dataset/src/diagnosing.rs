@@ -1,6 +1,6 @@
 //! Search for the diagnostics of a run.
 
-use dynocar_core::plausibility::{DetectedFault, DetectedFaults};
+use dynocar_core::plausibility::DetectedFault;
 use dynocar_core::plausibility::Severity::{Fundamental, Info, Warning};
 use dynocar_model::train::PowerTrain;
 use toml::Value;
@@ -11,9 +11,10 @@ use super::diagnostic::{Diagnostic, implausible_columns, read_as};
 use super::force_faults::force_faults;
 use super::forces::{Force, ForceSource};
 use super::position_faults::of_position;
-use super::quality::RunQuality;
+use super::quality::{Judge, RunQuality};
 use super::quantity::Quantity;
 use super::resolved::{Context, GradientSource, Resolved};
+use super::stuck::stuck_columns;
 
 /// Usual median time steps in s of recordings.
 const USUAL_STEP_S: (f64, f64) = (0.0005, 60.0);
@@ -41,8 +42,9 @@ pub(super) fn diagnostics(
     context: Context,
     run: &Resolved,
     quality: &RunQuality,
-    detected: &DetectedFaults,
+    judge: &Judge,
 ) -> Vec<Diagnostic> {
+    let detected = &judge.detected();
     let fault = |it: DetectedFault| Diagnostic::of_fault(it, read_as(context.manifest, it.fault));
     let mut diagnostics: Vec<Diagnostic> = detected.iter().copied().map(fault).collect();
     of_doubts(context, &mut diagnostics);
@@ -71,7 +73,10 @@ pub(super) fn diagnostics(
     }
     diagnostics.extend(implausible_columns(run));
     diagnostics.extend(column_faults(run));
-    diagnostics.extend(force_faults(context, run));
+    diagnostics.extend(force_faults(context, run, judge.windows()));
+    if detected.is_empty() {
+        diagnostics.extend(stuck_columns(context, run, judge.windows()));
+    }
     diagnostics
 }
 

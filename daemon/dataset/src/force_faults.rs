@@ -9,6 +9,7 @@ use super::diagnostic::Diagnostic;
 use super::forces::{Force, ForceSource};
 use super::quantity::Quantity;
 use super::resolved::{Context, Resolved};
+use super::stuck::{WINDOWS_MIN, Windows, moved_mps2};
 
 /// Force in N below which a force counts as zero.
 const ZERO_N: f64 = 1.0;
@@ -26,11 +27,11 @@ pub(super) const TRACTION_ALWAYS_ZERO: &str = "traction_always_zero";
 pub(super) const BRAKE_ALWAYS_ZERO: &str = "brake_always_zero";
 
 /// Returns the faults of a run's recorded forces.
-pub(super) fn force_faults(context: Context, run: &Resolved) -> Vec<Diagnostic> {
+pub(super) fn force_faults(context: Context, run: &Resolved, windows: Windows) -> Vec<Diagnostic> {
     let (traction, brake) = (&run.forces.traction, &run.forces.brake);
     let zeros = [
-        always_zero(run, traction, (Quantity::TractionForce, 1.0)),
-        always_zero(run, brake, (Quantity::BrakeForce, -1.0)),
+        always_zero(run, (traction, windows), (Quantity::TractionForce, 1.0)),
+        always_zero(run, (brake, windows), (Quantity::BrakeForce, -1.0)),
     ];
     let efforts = [
         beyond_effort(traction, Quantity::TractionForce, context.train, |it| it.traction.as_ref()),
@@ -43,7 +44,7 @@ pub(super) fn force_faults(context: Context, run: &Resolved) -> Vec<Diagnostic> 
 /// the change.
 fn always_zero(
     run: &Resolved,
-    force: &Force,
+    (force, windows): (&Force, Windows),
     (quantity, sign): (Quantity, f64),
 ) -> Option<Diagnostic> {
     let mut recorded = force.force_n.iter().filter(|it| !it.is_nan()).peekable();
@@ -66,6 +67,14 @@ fn always_zero(
             greatest_mps2 = greatest_mps2.max(change_mps2);
         }
     }
+    let moved: Vec<f64> =
+        windows.iter().filter_map(|it| moved_mps2(run, quantity, &it.1)).collect();
+    let is_forced = forced_s >= FORCED_MIN_S || moved.len() >= WINDOWS_MIN;
+    let greatest_mps2 = moved.into_iter().fold(greatest_mps2, f64::max);
+    let by = match forced_s >= FORCED_MIN_S {
+        true => format!("by more than {FORCED_MPS2} m/s²"),
+        false => "more than gradient and resistance make it".into(),
+    };
     let (code, changes, hint) = match quantity {
         Quantity::BrakeForce => (
             BRAKE_ALWAYS_ZERO,
@@ -75,11 +84,11 @@ fn always_zero(
         _ => (TRACTION_ALWAYS_ZERO, "speeds up", "map the column that holds it"),
     };
     let text = format!(
-        "{quantity} is 0 in all rows, yet the train {changes} by more than {FORCED_MPS2} m/s²: it was not \
+        "{quantity} is 0 in all rows, yet the train {changes} {by}: it was not \
          recorded; {hint}"
     );
     let figures = [("quantity", quantity.name().into()), ("greatest_mps2", greatest_mps2.into())];
-    (forced_s >= FORCED_MIN_S).then(|| Diagnostic::new(code, Fundamental, text, figures))
+    is_forced.then(|| Diagnostic::new(code, Fundamental, text, figures))
 }
 
 /// Returns that a force exceeds the declared effort by far in some rows, as where a recorder writes a number in the

@@ -264,6 +264,8 @@ pub(super) struct Judge {
     admission: Admission,
     resolver: ForceResolver,
     balance: WindowBalance,
+    /// The windows of motion, each with the row that ended it.
+    windows: Vec<(usize, WindowMean)>,
     mirrored: Option<MirroredLine>,
     rows: usize,
     /// How many samples are refused for each reason, and the row of the first.
@@ -282,6 +284,7 @@ impl Judge {
             admission,
             resolver: ForceResolver::new(context.train.clone(), context.track.cloned()),
             balance: WindowBalance::of_all(),
+            windows: Vec::new(),
             mirrored: mirrored
                 .and_then(|track| MirroredLine::new(track.clone(), context.train.length_m)),
             rows: 0,
@@ -297,11 +300,12 @@ impl Judge {
             *first_row = if *count == 0 { self.rows } else { *first_row };
             *count += 1;
         }
-        self.rows += 1;
         let window = self.admission.ended_window();
         if let Some(window) = window {
             self.balance.push(window);
+            self.windows.push((self.rows, *window));
         }
+        self.rows += 1;
         if let Some(mirrored) = &mut self.mirrored {
             mirrored.take(sample, window);
         }
@@ -316,6 +320,11 @@ impl Judge {
         } else {
             live.clone()
         }
+    }
+
+    /// Returns the windows of motion, each with the row that ended it.
+    pub fn windows(&self) -> &[(usize, WindowMean)] {
+        &self.windows
     }
 
     /// Returns how forces, gradients and accelerations go together over the whole run.

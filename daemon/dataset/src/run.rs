@@ -231,7 +231,7 @@ pub(super) fn read(
     let samples: Vec<TrainSample> =
         resolved.samples(number, context.train).inspect(|sample| judge.take(sample)).collect();
     let quality = quality::assess(&resolved, &samples, &judge);
-    let diagnostics = diagnostics(context, &resolved, &quality, &judge.detected());
+    let diagnostics = diagnostics(context, &resolved, &quality, &judge);
     Ok(Run {
         file: entry.file.clone(),
         number,
