@@ -4,9 +4,12 @@
 use super::order::quantile;
 
 /// An hour, by which clocks are put forward and back.
-const HOUR_S: f64 = 3600.0;
-/// A clock of twelve hours begins again after these.
+pub(super) const HOUR_S: f64 = 3600.0;
+/// A clock of twelve hours begins again after these, one of a day at midnight.
 pub(super) const HALF_DAY_S: f64 = 12.0 * HOUR_S;
+pub(super) const DAY_S: f64 = 2.0 * HALF_DAY_S;
+/// Counters of 32 and of 16 bits begin again after as many ms or µs.
+const COUNTERS_S: [f64; 5] = [4_294_967.296, 2_147_483.648, 4_294.967_296, 2_147.483_648, 65.536];
 /// Greatest change in m/s of a moving train's speed over a step, in addition to that by its acceleration.
 const SPEED_STEP_MPS: f64 = 1.0;
 /// Speed in m/s above which a train moves, by the coarsest sensor.
@@ -75,11 +78,13 @@ fn set_back(times_s: &mut [f64], speed_mps: &[f64], step_s: f64) -> Vec<(usize, 
     let mut before_s = times_s[0];
     for row in 1..times_s.len() {
         let ahead_s = times_s[row] - before_s;
+        let begins_again_s = begins_again_s((before_s, times_s[row]), step_s);
         before_s = times_s[row];
-        let hour_s = match ahead_s {
-            0.0.. => HOUR_S,
-            _ if ahead_s < -0.5 * HALF_DAY_S => -HALF_DAY_S,
-            _ => -HOUR_S,
+        let hour_s = match (begins_again_s, ahead_s) {
+            (Some(after_s), _) => -after_s,
+            (None, 0.0..) => HOUR_S,
+            (None, _) if ahead_s < -0.5 * HALF_DAY_S => -HALF_DAY_S,
+            (None, _) => -HOUR_S,
         };
         let is_hour = (ahead_s - hour_s - step_s).abs() <= 1.5 * step_s.max(0.4);
         let (from, to) = (speed_mps[row - 1], speed_mps[row]);
@@ -93,6 +98,14 @@ fn set_back(times_s: &mut [f64], speed_mps: &[f64], step_s: f64) -> Vec<(usize, 
         times_s[row] += shift_s;
     }
     jumps
+}
+
+/// Returns the time in s after which a clock begins again at 0, where it does so between two rows.
+fn begins_again_s((before_s, now_s): (f64, f64), step_s: f64) -> Option<f64> {
+    let spare_s = 2.5 * step_s.max(0.4);
+    let is_end = |after_s: &f64| (after_s - spare_s..*after_s + step_s).contains(&before_s);
+    let begins = (0.0..spare_s).contains(&now_s) && now_s < before_s;
+    [DAY_S].into_iter().chain(COUNTERS_S).find(is_end).filter(|_| begins)
 }
 
 /// Spreads rows that share a stamp evenly over the time to the next one; gives how many usually do.
@@ -202,6 +215,21 @@ mod tests {
             .map(|(row, it)| it + if row < 150 { 0.0 } else { HOUR_S })
             .collect();
         assert_eq!(mended(&stood, &[0.0; 400]).0, stood, "a train that stands for an hour");
+    }
+
+    #[test]
+    fn a_clock_that_begins_again_at_midnight_or_after_its_last_count_goes_on() {
+        let true_s: Vec<f64> = (0..1000).map(|row| 0.2 * row as f64).collect();
+        for after_s in [DAY_S].into_iter().chain(COUNTERS_S) {
+            let start_s = after_s - 30.1;
+            let wrapped: Vec<f64> =
+                true_s.iter().map(|it| (start_s + it).rem_euclid(after_s)).collect();
+            let (found, faults, order) = mended(&wrapped, &[20.0; 1000]);
+            let expected: Vec<f64> = true_s.iter().map(|it| start_s + it).collect();
+            assert!(are_equal(&found, &expected), "{after_s} s");
+            assert_eq!((faults.jumps[0], order), ((151, -after_s), None));
+            assert_eq!(faults.jumps.len(), if after_s < 100.0 { 3 } else { 1 });
+        }
     }
 
     #[test]

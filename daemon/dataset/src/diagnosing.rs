@@ -5,7 +5,7 @@ use dynocar_core::plausibility::Severity::{Fundamental, Info, Warning};
 use dynocar_model::train::PowerTrain;
 use toml::Value;
 
-use super::clock_faults::HALF_DAY_S;
+use super::clock_faults::{DAY_S, HALF_DAY_S, HOUR_S};
 use super::column_faults::column_faults;
 use super::diagnostic::{Diagnostic, implausible_columns, read_as};
 use super::force_faults::force_faults;
@@ -133,12 +133,26 @@ fn of_doubts(context: Context, diagnostics: &mut Vec<Diagnostic>) {
 /// Adds the repairs of the times, and the faults that cannot be repaired.
 fn of_clock(run: &Resolved, diagnostics: &mut Vec<Diagnostic>) {
     let faults = &run.clock_faults;
+    let mut jumps: Vec<(usize, f64, usize)> = Vec::new();
     for &(row, jump_s) in &faults.jumps {
+        match jumps.iter_mut().find(|it| it.1 == jump_s) {
+            Some((_, _, count)) => *count += 1,
+            None => jumps.push((row, jump_s, 1)),
+        }
+    }
+    for (row, jump_s, count) in jumps {
         let (line, way) = (run.table.line(row), if jump_s < 0.0 { "back" } else { "forward" });
-        let is_half_day = jump_s.abs() == HALF_DAY_S;
-        let cause = if is_half_day { "a clock of twelve hours" } else { "summer time" };
+        let cause = match -jump_s {
+            HOUR_S => "summer time",
+            HALF_DAY_S => "a clock of twelve hours",
+            DAY_S => "seconds of the day, which begin again at midnight",
+            ..0.0 => "summer time",
+            _ => "a counter that begins again at 0",
+        };
+        let more =
+            if count > 1 { format!(", and {} times later on,", count - 1) } else { "".into() };
         let text = format!(
-            "the clock went {way} by {:.0} s in line {line} while the train went on: {cause}? The rows from there \
+            "the clock went {way} by {} s in line {line}{more} while the train went on: {cause}? The rows from there \
              are read as if it had not",
             jump_s.abs()
         );
