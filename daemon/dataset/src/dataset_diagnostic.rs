@@ -1,6 +1,8 @@
 //! Diagnostics to know before results from a dataset are believed, each once: those of its runs, and declarations of
 //! the train and the line that cannot be true.
 
+use std::collections::BTreeMap;
+
 use dynocar_core::plausibility::window_balance::WindowBalance;
 use dynocar_core::plausibility::{
     DetectedFault, Severity, gradient_fault, mirrored_line, other_line,
@@ -14,6 +16,7 @@ use serde::Serialize;
 use super::Dataset;
 use super::diagnostic::{Diagnostic, unusual_resistance};
 use super::keys::assign;
+use super::manifest::Role;
 use super::resolved::GradientSource;
 use super::run::Run;
 use super::speed_and_position::PositionSource;
@@ -111,6 +114,7 @@ pub fn diagnostics<'r>(
     }
     let of_line = all.mirrored_line().or_else(|| all.gradient_scale());
     diagnostics.extend(of_line.or_else(|| all.other_line()));
+    diagnostics.extend(all.copies());
     diagnostics.sort_by_key(|diagnostic| std::cmp::Reverse(diagnostic.severity));
     diagnostics
 }
@@ -125,6 +129,8 @@ struct AllRuns {
     /// Of the runs whose gradients are the line's at recorded positions: as it is, and read from its other end.
     on_line: Option<[WindowBalance; 2]>,
     files: Vec<String>,
+    /// Runs by the hash of their motion: files, and whether one is to fit and one held out.
+    motions: BTreeMap<u64, (Vec<String>, [bool; 2])>,
     has_fault: bool,
 }
 
@@ -140,7 +146,36 @@ impl AllRuns {
             mirrored.add(&run.mirrored);
         }
         self.files.push(run.file.clone());
+        if let Some(hash) = run.motion_hash {
+            let (files, has_role) = self.motions.entry(hash).or_default();
+            files.push(run.file.clone());
+            has_role[usize::from(run.role == Role::Holdout)] = true;
+        }
         self.has_fault |= run.diagnostics.iter().any(|it| it.fault.is_some());
+    }
+
+    /// Returns the runs that hold the motion of others, where one is held out and where none is.
+    fn copies(&self) -> impl Iterator<Item = DatasetDiagnostic> {
+        let text = |is_held_out| match is_held_out {
+            true => {
+                "of these runs, one that is held out has the times and speeds of one to fit: it tests nothing; hold another \
+                 run out"
+            }
+            false => {
+                "each of these runs has the times and speeds of another of them, and counts more than once: leave the \
+                 copies out"
+            }
+        };
+        let diagnostic = move |is_held_out| {
+            let copies = self.motions.values().filter(move |(files, has_role)| {
+                files.len() > 1 && (*has_role == [true, true]) == is_held_out
+            });
+            let runs: Vec<String> = copies.flat_map(|it| it.0.iter().cloned()).collect();
+            let (code, severity, text) =
+                ("copied_run", Severity::Warning, text(is_held_out).into());
+            (!runs.is_empty()).then_some(DatasetDiagnostic { code, severity, runs, text })
+        };
+        [true, false].into_iter().filter_map(diagnostic)
     }
 
     /// Returns that the gradients are in another unit, where no run shows a fault by itself.

@@ -1,5 +1,6 @@
 //! One run, from its file to the samples that the pipelines take.
 
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::mem::take;
 
 use dynocar_core::plausibility::InputFault;
@@ -26,6 +27,8 @@ use super::text_layout::TrainRows;
 use super::trains::{TrainsColumn, keep_only, only};
 
 const DAY_S: i64 = 86_400;
+/// A slower run in m/s is that of a standing train, as any other.
+const MOVING_MPS: f64 = 1.0;
 
 /// Quantities that a sample does not carry and a run keeps in addition, with name and unit. The power from the line
 /// comes from its own column, or from voltage and current.
@@ -87,6 +90,8 @@ pub struct Run {
     pub gradient_unit: Unit,
     /// Quality of the data.
     pub quality: RunQuality,
+    /// Hash of its motion, by which copies of a run are known; `None` where the train hardly moves.
+    pub motion_hash: Option<u64>,
     /// Diagnostics: likely mistakes, or facts to know.
     pub diagnostics: Vec<Diagnostic>,
 }
@@ -254,9 +259,23 @@ pub(super) fn read(
         balance: judge.balance(),
         mirrored: judge.mirrored(),
         gradient_unit: read_as(context.manifest, InputFault::GradientScale),
+        motion_hash: quality
+            .speed_range_mps
+            .filter(|range| range.1 > MOVING_MPS)
+            .map(|_| motion_hash(&resolved)),
         quality,
         diagnostics,
     })
+}
+
+/// Returns the hash of a run's times since its start, in whole ms, and of its speeds.
+fn motion_hash(run: &Resolved) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    for (time_s, speed_mps) in run.times_s.iter().zip(&run.speeds.speed_mps) {
+        let since_ms = (1e3 * (time_s - run.times_s[0])).round() as i64;
+        (since_ms, speed_mps.to_bits()).hash(&mut hasher);
+    }
+    hasher.finish()
 }
 
 /// Reads the rows of the train of a text.

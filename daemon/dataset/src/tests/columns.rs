@@ -54,3 +54,35 @@ fn a_break_of_the_chainage_is_named_and_no_other_unit() {
     assert!(named[0].starts_with("the position jumps by 800 m in line 1002: "), "{named:?}");
     assert!(texts(&run, "distance_mismatch").is_empty());
 }
+
+#[test]
+fn a_run_that_holds_the_motion_of_another_is_named() {
+    let run = |shift: i32, scale: f64| -> String {
+        let row = |row: i32| format!("{},{}\n", row + shift, scale * f64::from(row % 30));
+        "t,v\n".to_owned() + &(0..200).map(row).collect::<String>()
+    };
+    let codes = |texts: [&str; 3], last_role: &str| -> Vec<(&'static str, Vec<String>)> {
+        let manifest = format!(
+            "[dataset]\nname='x'\n[train]\nfile='train.toml'\n[columns]\ntime={{column='t',unit='s'}}\n\
+             speed={{column='v',unit='m/s'}}\n[[runs]]\nfile='0.csv'\n[[runs]]\nfile='1.csv'\n\
+             [[runs]]\nfile='2.csv'\nrole='{last_role}'\n"
+        );
+        let files = [
+            ("dataset.toml", &manifest[..]),
+            ("train.toml", TRAIN),
+            ("0.csv", texts[0]),
+            ("1.csv", texts[1]),
+            ("2.csv", texts[2]),
+        ];
+        let found = Dataset::load(&files[..]).unwrap().diagnostics().into_iter();
+        found.filter(|it| it.code == "copied_run").map(|it| (it.code, it.runs)).collect()
+    };
+    let (one, later, other) = (run(0, 1.0), run(1000, 1.0), run(0, 1.1));
+    assert_eq!(codes([&one, &other, &run(0, 0.9)], "holdout"), []);
+    let copied = vec![("copied_run", vec!["0.csv".to_owned(), "2.csv".to_owned()])];
+    for role in ["holdout", "fit"] {
+        assert_eq!(codes([&one, &other, &later], role), copied, "{role}");
+    }
+    let standing = "t,v\n0,0\n1,0\n2,0\n";
+    assert_eq!(codes([standing, standing, standing], "holdout"), []);
+}
