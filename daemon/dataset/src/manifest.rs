@@ -223,6 +223,7 @@ fn columns(section: &Item) -> Result<Vec<ColumnMapping>, DatasetError> {
             section.need(quantity.name(), &expected)?;
         }
     }
+    require_own_columns(&mappings)?;
     let is_mapped =
         |quantity: Quantity| mappings.iter().any(|mapping| mapping.quantity == quantity);
     for other in [
@@ -236,6 +237,23 @@ fn columns(section: &Item) -> Result<Vec<ColumnMapping>, DatasetError> {
         }
     }
     Ok(mappings)
+}
+
+/// Refuses a column that is taken for two quantities.
+fn require_own_columns(mappings: &[ColumnMapping]) -> Result<(), DatasetError> {
+    for (at, mapping) in mappings.iter().enumerate() {
+        for name in mapping.names() {
+            let twin = mappings[..at].iter().find(|other| other.names().any(|it| it == name));
+            let Some(twin) = twin else { continue };
+            let words = format!(
+                "column '{name}' is mapped to {} and to {}: expected a column of its own for each; a force that \
+                 is negative while the train brakes is a control_force",
+                twin.quantity, mapping.quantity
+            );
+            return Err(mapping.place.clone().problem(words));
+        }
+    }
+    Ok(())
 }
 
 fn mapping(columns: &Item, quantity: Quantity) -> Result<ColumnMapping, DatasetError> {

@@ -242,3 +242,14 @@ fn a_signed_control_force_excludes_the_two() {
          give one of them"
     );
 }
+
+#[test]
+fn a_column_holds_one_quantity() {
+    let both = "traction_force = { column = \"F\", unit = \"kN\" }\n\
+                brake_force = { column = \"F\", unit = \"kN\", scale = -1 }\n[[runs]]";
+    assert_eq!(
+        refusal(&FULL.replacen("[[runs]]", both, 1)),
+        "dataset.toml:16: column 'F' is mapped to traction_force and to brake_force: expected a column of its own for \
+         each; a force that is negative while the train brakes is a control_force"
+    );
+}
