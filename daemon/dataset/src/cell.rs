@@ -140,6 +140,8 @@ pub fn not_a_value(
         && parse_cell(cell, Marks::plain(b'.')).is_some()
     {
         format!("; for decimal points {}", DECIMAL.advice("\".\""))
+    } else if mapping.quantity == Quantity::Position && is_of_km_and_m(&lossy(cell)) {
+        format!("; {METRES_ALONE}")
     } else if let Some(mark) = grouping(cell, layout) {
         format!("; for marks of thousands {}", GROUPS.advice(format!("{mark:?}")))
     } else if is_below_names && !layout.units_row {
@@ -157,6 +159,17 @@ pub fn not_a_value(
             FORMAT.assign(format!("\"{}\"", format.name()))
         ),
     }
+}
+
+/// Remedy of a chainage as railways write it.
+pub const METRES_ALONE: &str = "write a chainage of km and m as metres: 12345 for 12+345";
+
+/// Returns whether a cell holds a chainage as `12+345` or `12+345.6`: km, and three digits of m.
+pub fn is_of_km_and_m(cell: &str) -> bool {
+    let Some((km, m)) = cell.split_once('+') else { return false };
+    let (whole, part) = m.split_once(['.', ',']).unwrap_or((m, ""));
+    let is_digits = |it: &str| it.bytes().all(|letter| letter.is_ascii_digit());
+    !km.is_empty() && whole.len() == 3 && [km, whole, part].into_iter().all(is_digits)
 }
 
 /// Returns the mark that would make a number of a cell, were it between groups of three digits.

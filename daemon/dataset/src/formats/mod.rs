@@ -10,7 +10,22 @@ use super::format::{Format, RecordingPath, RunReading};
 pub static FORMATS: &[&Format] = &[&CSV, &PARQUET, &MCAP];
 
 /// Rows of text, in the layout that the dataset declares; also of files with an unknown extension.
-pub static CSV: Format = Format::of_text("CSV", "csv", Ok);
+pub static CSV: Format = Format::of_text("CSV", "csv", rows_of_csv);
+
+/// Refuses JSON, whose marks would pass for those between cells.
+fn rows_of_csv(text: String) -> Result<String, String> {
+    let mut letters = text.trim_start_matches('\u{feff}').chars().filter(|it| !it.is_whitespace());
+    let is_json = match [letters.next(), letters.next()] {
+        [Some('{'), next] => matches!(next, Some('"' | '}')),
+        [Some('['), next] => matches!(next, Some('{' | '[')),
+        _ => false,
+    };
+    match is_json {
+        false => Ok(text),
+        true => Err("expected rows of CSV, found JSON: write a row of names, and below it a row of values for each record"
+            .into()),
+    }
+}
 
 /// Tables of any program as runs, and recordings that `dynocar convert` has written.
 pub static PARQUET: Format = Format {
@@ -42,4 +57,20 @@ pub fn of_run(path: impl AsRef<Path>) -> &'static Format {
 /// Returns the format of a recording by its extension; `None` where no recording has this extension.
 pub fn of_recording(path: &Path) -> Option<&'static Format> {
     FORMATS.iter().find(|it| it.recording.is_some() && it.is_of(path)).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn json_is_no_csv() {
+        for json in ["{\"t\": 0.0}\n{\"t\": 1.0}\n", " [\n {\"t\": 0.0}]", "[[0.0, 1.0]]", "{}"] {
+            let refused = CSV.rows(json.into()).unwrap_err().to_string();
+            assert!(refused.contains("found JSON"), "{refused}");
+        }
+        for csv in ["t,v\n0,1\n", "[s],[m/s]\n0,1\n", "\"t\",\"v\"\n0,1\n", ""] {
+            assert!(CSV.rows(csv.into()).is_ok(), "{csv}");
+        }
+    }
 }

@@ -6,6 +6,7 @@ use super::facts::{Facts, TextCell};
 use super::guessed::GuessedColumn;
 use super::name::{Name, TermWeight, VOCABULARY, listed, readings, scaled_unit, terms};
 use crate::Quantity;
+use crate::cell::{METRES_ALONE, is_of_km_and_m};
 use crate::error::nearest;
 
 /// Score of a name that states the quantity and nothing else.
@@ -82,7 +83,11 @@ pub fn can_hold(facts: &Facts, quantity: Quantity) -> Result<(), String> {
     let is_rare = facts.texts * TEXTS_RARE < facts.numbers;
     if let Some(text) = facts.text.as_ref().filter(|_| !(is_needed && is_rare)) {
         let TextCell { file, line, cell } = text;
-        return Err(format!("it holds text in {file}line {line}: '{cell}'"));
+        let remedy = match quantity == Quantity::Position && is_of_km_and_m(cell) {
+            true => format!("; {METRES_ALONE}"),
+            false => String::new(),
+        };
+        return Err(format!("it holds text in {file}line {line}: '{cell}'{remedy}"));
     }
     let (Some(top), min, max) = (facts.top(), facts.min, facts.max) else {
         return Err("it holds no value".into());
@@ -134,7 +139,9 @@ fn by_name(name: &Name, quantity: Quantity) -> Option<Result<Match, String>> {
     if let Some(text) = &name.unit {
         let Some(unit) = Unit::spelled(quantity.dimension(), text) else {
             let problem = match is_unit(text) {
-                true => format!("its unit '{text}' is none of {quantity}"),
+                true => {
+                    format!("its unit '{text}' is none of {quantity}{}", share_of(quantity, text))
+                }
                 false => format!("{UNKNOWN_UNIT}'{text}'"),
             };
             return Some(Err(contradiction(words, quantity).unwrap_or(problem)));
@@ -146,6 +153,21 @@ fn by_name(name: &Name, quantity: Quantity) -> Option<Result<Match, String>> {
         return Some(Err(against));
     }
     (best.score >= ENOUGH).then_some(Ok(best))
+}
+
+/// Returns the remedy of a force in a unit of shares.
+fn share_of(quantity: Quantity, unit: &str) -> String {
+    let handle = match quantity {
+        Quantity::TractionForce => Quantity::TractionHandle,
+        Quantity::BrakeForce => Quantity::BrakeHandle,
+        _ => return String::new(),
+    };
+    match Unit::spelled(Dimension::Ratio, unit) {
+        Some(_) => {
+            format!("; map a share of the effort as {handle}, and state the effort in train.toml")
+        }
+        None => String::new(),
+    }
 }
 
 /// Returns the match of the words with a quantity.

@@ -56,6 +56,25 @@ fn a_break_of_the_chainage_is_named_and_no_other_unit() {
 }
 
 #[test]
+fn curves_narrower_than_any_track_are_named() {
+    let csv: String = (0..100).map(|second| format!("{second},10,0.6\n")).collect();
+    let example = Example::new(&[["curve_radius", "R", "m"]], &format!("t,v,R\n{csv}"));
+    let named = texts(&example.run(), "narrow_curve");
+    let expected = "curve_radius lies below 10 m in 100 rows, down to 0.6 m, where no track is: is the unit km?";
+    assert_eq!(named, [expected]);
+}
+
+#[test]
+fn a_chainage_of_km_and_m_is_refused_with_the_remedy() {
+    let example = Example::new(&[["position", "s", "m"]], "t,v,s\n0,1,12+345\n1,1,12+346.5\n");
+    let refused = example.load().unwrap_err().to_string();
+    assert!(
+        refused.contains("write a chainage of km and m as metres: 12345 for 12+345"),
+        "{refused}"
+    );
+}
+
+#[test]
 fn a_run_that_holds_the_motion_of_another_is_named() {
     let run = |shift: i32, scale: f64| -> String {
         let row = |row: i32| format!("{},{}\n", row + shift, scale * f64::from(row % 30));

@@ -241,3 +241,14 @@ fn times_are_read_as_they_were_recorded() {
         assert!(worst.unwrap() < 200_000, "{name}: {worst:?} {time:?} {:?}", &times_ns[..12]);
     }
 }
+
+#[test]
+fn a_chainage_of_km_and_m_and_a_share_of_the_effort_are_named_with_the_remedy() {
+    let text = "t [s];v [m/s];Chainage;Tractive effort [%]\n".to_owned()
+        + &(0..40).map(|k| format!("{k};{k};1+{:03};50\n", 10 * k)).collect::<String>();
+    let recordings = [RecordingText { label: "a.csv", text: &text }];
+    let guess = guess(&recordings, &[], GivenMarks::default()).unwrap();
+    let why = format!("{:?}", guess.unmapped);
+    assert!(why.contains("12345 for 12+345"), "{why}");
+    assert!(why.contains("map a share of the effort as traction_handle"), "{why}");
+}
