@@ -269,7 +269,10 @@ fn contradiction(words: &[String], quantity: Quantity) -> Option<String> {
         (&known.about, "something about a measurement"),
         (&known.other_things, "another thing"),
     ];
-    for (list, what) in lists {
+    let of_mass = (&known.parts_of_mass, "a part of the train's mass");
+    for (list, what) in
+        lists.into_iter().chain((quantity == Quantity::TrainMass).then_some(of_mass))
+    {
         let is_known = |word: &&String| {
             let is_in = |it: &str| *word == it || (it.len() >= 4 && word.contains(it));
             !own.contains(&word.as_str()) && listed(list).any(is_in)

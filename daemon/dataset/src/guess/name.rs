@@ -239,6 +239,8 @@ pub struct NonQuantityWords {
     pub about: String,
     /// Words for things that have a temperature, a pressure, a speed … of their own.
     pub other_things: String,
+    /// Words for a mass that is not the whole train's.
+    pub parts_of_mass: String,
 }
 
 /// Names and usual values of a quantity.

@@ -243,6 +243,40 @@ fn times_are_read_as_they_were_recorded() {
 }
 
 #[test]
+fn the_mass_of_a_train_is_known_in_other_languages_and_no_part_of_it_is_taken_for_it() {
+    let mapped = |name: &str| {
+        let guess = guess_of(&[name], |_| vec![182.0]).unwrap();
+        guess.column(TrainMass).is_some()
+    };
+    for whole in [
+        "Masa del tren (t)",
+        "Masa total [t]",
+        "Massa del treno [t]",
+        "Masa pociągu [t]",
+        "Hmotnost vlaku [t]",
+        "Масса поезда (т)",
+        "列车质量 (t)",
+        "总重(t)",
+        "Bruttomasse [t]",
+        "masse totale [t]",
+    ] {
+        assert!(mapped(whole), "{whole}");
+    }
+    for part in [
+        "mass of locomotive [t]",
+        "Masse locomotive [t]",
+        "Wagenzugmasse [t]",
+        "tare mass [t]",
+        "braked weight [t]",
+        "Masa własna [t]",
+        "Massa a vuoto [t]",
+        "自重(t)",
+    ] {
+        assert!(!mapped(part), "{part}");
+    }
+}
+
+#[test]
 fn a_chainage_of_km_and_m_and_a_share_of_the_effort_are_named_with_the_remedy() {
     let text = "t [s];v [m/s];Chainage;Tractive effort [%]\n".to_owned()
         + &(0..40).map(|k| format!("{k};{k};1+{:03};50\n", 10 * k)).collect::<String>();
