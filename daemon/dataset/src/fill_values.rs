@@ -2,6 +2,7 @@
 //! missing.
 
 use std::collections::BTreeMap;
+use std::sync::LazyLock;
 
 use dynocar_model::units::Dimension;
 
@@ -43,7 +44,6 @@ pub(super) struct FillValue {
 
 /// Takes the fill values out of the columns of a run whose rows are in order.
 pub(super) fn take_out(table: &mut Table, manifest: &Manifest) -> Vec<FillValue> {
-    let usual = Usual::new();
     let mut found = Vec::new();
     for mapping in manifest.columns.iter().filter(|it| may_hold_one(it.quantity)) {
         let Some(column) = table.column(mapping.quantity) else { continue };
@@ -51,7 +51,7 @@ pub(super) fn take_out(table: &mut Table, manifest: &Manifest) -> Vec<FillValue>
         let known = found.len();
         while found.len() < known + 3
             && let Some(value) =
-                usual.far(&cells, mapping.quantity).or_else(|| usual.within(&cells))
+                USUAL.far(&cells, mapping.quantity).or_else(|| USUAL.within(&cells))
         {
             take_from(mapping, &mut cells, |_, cell| cell == value, &mut found);
         }
@@ -139,11 +139,18 @@ fn remove(table: &mut Table, quantity: Quantity, cells: &[f64]) {
     table.replace(quantity, values);
 }
 
+/// Returns whether recorders write a number in the place of a missing value.
+pub fn is_usual(cell: f64) -> bool {
+    USUAL.holds(cell)
+}
+
 /// The numbers that recorders use: digits of 9 alone, and the ends of whole numbers of 16, 24 and 32 bits, each with a
 /// decimal point somewhere.
 struct Usual {
     sorted: Vec<f64>,
 }
+
+static USUAL: LazyLock<Usual> = LazyLock::new(Usual::new);
 
 impl Usual {
     fn new() -> Self {
@@ -271,8 +278,7 @@ mod tests {
     use super::*;
 
     fn found(cells: &[f64], quantity: Quantity) -> Option<f64> {
-        let usual = Usual::new();
-        usual.far(cells, quantity).or_else(|| usual.within(cells))
+        USUAL.far(cells, quantity).or_else(|| USUAL.within(cells))
     }
 
     /// Returns cells that go up and down between two numbers, with another one in some of them.

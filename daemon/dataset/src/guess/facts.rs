@@ -3,6 +3,7 @@
 use crate::TimeFormat;
 use crate::cell::{parse_cell, truth};
 use crate::clock::{DayClock, PACKED_CLOCK, day_of_cell};
+use crate::fill_values::is_usual;
 use crate::text_layout::Marks;
 
 /// Number of values of a column that are kept, evenly spread, to find its middle and its top.
@@ -200,7 +201,13 @@ impl Facts {
 
     /// Returns the greatest magnitude, single spikes left out; `None` without a number.
     pub fn top(&self) -> Option<f64> {
-        self.values.quantile(0.99, f64::abs)
+        let top = self.values.quantile(0.99, f64::abs)?;
+        let is_fill = |value: f64| value.abs() == top && is_usual(value);
+        if !is_usual(top) || self.values.values.iter().all(|value| is_fill(*value)) {
+            return Some(top);
+        }
+        let others = self.values.values.iter().copied().filter(|value| !is_fill(*value));
+        Spread { values: others.collect(), ..Spread::default() }.quantile(0.99, f64::abs)
     }
 
     /// Returns the mean; `None` without a number.

@@ -81,6 +81,14 @@ fn what_was_requested_or_possible_is_not_what_acted_in_any_language() {
 }
 
 #[test]
+fn numbers_in_the_place_of_missing_values_say_nothing_of_the_unit() {
+    let gradient = |time: f64| if time % 20.0 == 7.0 { 9999.0 } else { (time % 9.0) - 4.0 };
+    let guess = guess_of(&["gradient_permille"], |time| vec![gradient(time)]).unwrap();
+    let column = guess.column(Gradient).unwrap();
+    assert_eq!((column.scale, column.unit.name(), &column.doubts[..]), (1.0, "permille", &[][..]));
+}
+
+#[test]
 fn units_are_read_as_loggers_write_them() {
     let cases = [
         ("traction power [hp]", TractionPower, "hp"),
