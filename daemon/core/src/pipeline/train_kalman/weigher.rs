@@ -47,6 +47,8 @@ pub struct Weigher {
     /// rests on.
     each_variance: f64,
     weight: f64,
+    /// Whether the load is still the one that was weighed.
+    holds_weighed: bool,
 }
 
 /// Moments of the weigher's own error, and its covariance with the states.
@@ -65,6 +67,7 @@ impl Weigher {
             variance: OWN_SHARE * weighing_variance,
             each_variance: weighing_variance,
             weight: WEIGHT_FIRST,
+            holds_weighed: false,
         }
     }
 
@@ -103,6 +106,7 @@ impl Weigher {
     /// Adds a variance to the load factor.
     pub fn disturb(&mut self, belief: &mut Gaussian<STATES>, variance: f64) {
         let moments = self.moments(belief);
+        self.learn(&moments, belief);
         belief.disturb(LOAD, variance);
         *self = self.given(&moments, belief);
     }
@@ -110,6 +114,7 @@ impl Weigher {
     /// Forgets the load: another mean and variance, of which the weigher knows nothing.
     pub fn forget_load(&mut self, belief: &mut Gaussian<STATES>, load: f64, variance: f64) {
         let mut moments = self.moments(belief);
+        self.learn(&moments, belief);
         belief.replace(LOAD, load, variance);
         moments.with[LOAD] = 0.0;
         *self = self.given(&moments, belief);
@@ -125,11 +130,15 @@ impl Weigher {
             belief.covariance[(i, LOAD)] = moments.with[i];
         }
         moments.with[LOAD] = moments.variance;
-        *self = self.given(&moments, belief);
+        *self = Weigher { holds_weighed: true, ..self.given(&moments, belief) };
     }
 
-    /// Learns from the load as it was driven how far its weighing was off beyond the weigher's own error.
+    /// Learns from the load as it was driven how far its weighing was off beyond the weigher's own error; once for each
+    /// weighing, before the load changes.
     fn learn(&mut self, moments: &Moments, belief: &Gaussian<STATES>) {
+        if !std::mem::take(&mut self.holds_weighed) {
+            return;
+        }
         let error = belief.mean[LOAD] - 1.0 - moments.mean;
         let variance =
             belief.covariance[(LOAD, LOAD)] - 2.0 * moments.with[LOAD] + moments.variance;
@@ -197,6 +206,8 @@ mod tests {
         for stop in 0..300 {
             // By turns 2 % too much and too little; the traction is reported 0.5 % too large.
             let load = if stop % 2 == 0 { 1.02 } else { 0.98 };
+            // A stop opens the load before the weigher shows the new one.
+            weigher.disturb(&mut belief, 0.01);
             weigher.weigh(&mut belief);
             see_traction(&mut belief, load + 0.005);
             let away = (load - belief.mean[LOAD]) / belief.covariance[(LOAD, LOAD)].sqrt();
