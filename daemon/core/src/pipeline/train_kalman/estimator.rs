@@ -9,7 +9,7 @@ use dynocar_model::train::TrainModel;
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Quantity, RejectionReason};
 
 use super::TrainKalmanSettings;
-use super::forces::BrakeErrors;
+use super::brake::BrakeErrors;
 use super::learned_state::{JumpShare, LearnedState, LoadWatch, ResistanceBelief};
 use super::motion_bank::SpeedLikelihood;
 use super::motion_filter::{FORCE_DELAY, SPEED, wind_over};
@@ -141,7 +141,12 @@ impl TrainKalman {
         } else {
             self.learned.monitor.break_here();
         }
-        self.learned.brake.learn(&step, &self.learned.bank.likeliest().belief);
+        if self.learned.brake.learn(&step, &self.learned.bank.likeliest().belief) {
+            let brake = self.learned.brake;
+            self.reset();
+            self.learned.brake = brake;
+            return self.begin(now, sample);
+        }
         self.speeds.push(now.speed_mps);
         self.systematic.see(step.travelled_m, sample.position_m, now.speed_mps);
         self.moved_s += step.duration_s;
@@ -173,7 +178,8 @@ impl TrainKalman {
         self.learned.bank.change_load(self.load.renewed());
         self.learned.noise.reset();
         self.learned.jumps = JumpShare::default();
-        self.learned.brake = BrakeErrors::new(self.settings.brake_scale_std);
+        self.learned.brake =
+            BrakeErrors::new(self.settings.brake_scale_std, self.settings.brake_lag_s);
         self.moved_s = 0.0;
         self.moved_min_s = MOVED_MIN_S;
         self.report = TrainKalmanReport::new(&self.learned.bank.published(0.0, 0.0, 0.0));
@@ -265,7 +271,7 @@ impl Estimator for TrainKalman {
         let unit = UnitSample::from_sample(sample);
         if let Ok(unit) = unit {
             self.steps.see_pressure(sample.brake_cylinder_pressure_pa);
-            self.steps.see(&unit);
+            self.steps.see(&unit, &self.learned.brake.lags_s);
         }
         if !self.is_under_way(sample) {
             self.last = None;

@@ -6,7 +6,7 @@ use dynocar_model::train::{Davis, TrainModel};
 use nalgebra::{Matrix3, Vector3};
 
 use super::TrainKalmanSettings;
-use super::forces::BrakeErrors;
+use super::brake::BrakeErrors;
 use super::motion_bank::{MotionBank, SpeedLikelihood};
 use super::motion_filter::{
     BRAKE_ERROR, BRAKE_SCALE, COEFFICIENTS, FORCE_DELAY, LOAD, MotionState, RESISTANCE, SPEED,
@@ -42,7 +42,7 @@ impl LearnedState {
             bank: first.bank(settings),
             noise: SpeedNoise::guessed(settings.speed_noise_mps),
             jumps: JumpShare::default(),
-            brake: BrakeErrors::new(settings.brake_scale_std),
+            brake: BrakeErrors::new(settings.brake_scale_std, settings.brake_lag_s),
             monitor: InnovationMonitor::new(INNOVATION_MEMORY),
         }
     }

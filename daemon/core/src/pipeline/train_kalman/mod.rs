@@ -17,6 +17,7 @@ use crate::settings;
 pub use estimator::TrainKalman;
 pub use learned_state::declared_a_std;
 
+mod brake;
 mod estimator;
 mod forces;
 mod learned_state;

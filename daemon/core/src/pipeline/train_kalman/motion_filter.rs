@@ -58,6 +58,8 @@ pub enum Following {
     Building,
     /// It is released under way.
     Releasing,
+    /// Little is left of the force that was released.
+    Fading,
     /// Its report fades as the train comes to a stand, which friction may do that is not reported.
     Stopping,
     /// It held the standing train, and is released for the start: by friction, also where an electric brake does the rest.

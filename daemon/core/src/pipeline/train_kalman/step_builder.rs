@@ -5,9 +5,10 @@ use dynocar_model::terms::wind;
 use dynocar_model::track::{gradient_error_kept, gradient_error_of_mean};
 
 use super::TrainKalmanSettings;
-use super::forces::{BrakeErrors, ForceHistory};
+use super::brake::SlowestBrake;
+use super::forces::ForceHistory;
 use super::learned_state::{LearnedState, ResistanceBelief};
-use super::motion_filter::{FilterStep, Following, MapErrorStep, wind_over};
+use super::motion_filter::{FilterStep, MapErrorStep, wind_over};
 use crate::pipeline::momentum::UnitSample;
 
 /// How long a change of force is remembered, in s.
@@ -17,37 +18,11 @@ const FORCE_RATE_MEMORY_S: f64 = 0.5;
 const KNOWN_SLOPE_MEMORY_S: f64 = 1.0;
 const KNOWN_SLOPE_MEMORY_M: f64 = 10.0;
 
-/// Change of speed in m/s, and time in s, over which the difference between brake force and report becomes another one:
-/// friction depends on speed, is blended by speed, and heats up in a long descent.
-const BRAKE_ERROR_MPS: f64 = 3.0;
-const BRAKE_ERROR_TIME_S: f64 = 600.0;
-
 /// Random walk of the brake force's scale over an hour of motion.
 const BRAKE_DRIFT_PER_SQRT_H: f64 = 0.03;
 
-/// Standard deviation in N/kN of a brake force below which it is taken for exact.
-const BRAKE_STD_LEAST: f64 = 1e-3;
 /// Time in s over which a wind is taken for the same: a step of the filters for each sample would cost time.
 const WIND_STEP_S: f64 = 1.0;
-
-/// Force in N/kN below which a brake is taken to have been released.
-const RELEASED: f64 = 0.1;
-/// Speed in m/s below which friction may take over from an electric brake.
-const FRICTION_MPS: f64 = 4.0;
-
-/// Error of a brake force over a step.
-struct BrakeError {
-    /// Way in which it follows its report.
-    following: Following,
-    /// Expected force beyond its report in N/kN.
-    late: f64,
-    /// Standard deviation in N/kN.
-    std: f64,
-    /// Share of its square by how late the brake is.
-    lateness: f64,
-    /// Share of the error that is left of the step before.
-    kept: f64,
-}
 
 /// Memory of the samples from which steps are made.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,22 +36,7 @@ pub struct StepBuilder {
     force_rate: f64,
     /// Change of the known retarding forces in N/kN per m.
     known_slope: f64,
-    /// Brake force in N/kN of a brake as slow as may be, and the time in ns it refers to.
-    followed: f64,
-    /// True from a report of the brake until one of traction.
-    is_braking: bool,
-    /// True while a brake may act that is not reported.
-    is_stopping: bool,
-    /// True from a standstill until the brake that held the train is released.
-    was_held: bool,
-    /// Brake-cylinder pressure in Pa of the newest sample, and the share that it is of the pressure before, 1 at most.
-    pressure_pa: Option<f64>,
-    pressure_left: f64,
-    /// Direction between an error of the brake's scale and one of its time, of the newest step: one says nothing of the
-    /// other.
-    brake_angle: f64,
-    /// How often the brake's error was renewed since it was used last.
-    renewals: f64,
+    slowest_brake: SlowestBrake,
     /// Time in s since the wind was moved on.
     wind_s: f64,
     /// Time in ns and motion segment of the newest sample.
@@ -96,14 +56,7 @@ impl StepBuilder {
             acting,
             force_rate: 0.0,
             known_slope: 0.0,
-            followed: 0.0,
-            is_braking: false,
-            is_stopping: false,
-            was_held: false,
-            pressure_pa: None,
-            pressure_left: 1.0,
-            brake_angle: 0.0,
-            renewals: 0.0,
+            slowest_brake: SlowestBrake::default(),
             wind_s: 0.0,
             seen: None,
             unseen_m: f64::INFINITY,
@@ -112,15 +65,11 @@ impl StepBuilder {
 
     /// Takes in the brake-cylinder pressure in Pa, before the forces of the same sample.
     pub fn see_pressure(&mut self, pressure_pa: Option<f64>) {
-        let before_pa = std::mem::replace(&mut self.pressure_pa, pressure_pa);
-        self.pressure_left = match before_pa.zip(pressure_pa) {
-            Some((before_pa, now_pa)) if before_pa > 0.0 => (now_pa / before_pa).clamp(0.0, 1.0),
-            _ => 1.0,
-        };
+        self.slowest_brake.see_pressure(pressure_pa);
     }
 
-    /// Takes in the reported forces, also at a standstill.
-    pub fn see(&mut self, now: &UnitSample) {
+    /// Takes in the reported forces, also at a standstill, with the slowest brake's times in s to build up and release.
+    pub fn see(&mut self, now: &UnitSample, lags_s: &[f64; 2]) {
         self.acting.see((now.time_ns, now.segment), [now.traction, now.brake]);
         let (seen_ns, segment) =
             self.seen.replace((now.time_ns, now.segment)).unwrap_or((i64::MIN, 0));
@@ -129,44 +78,7 @@ impl StepBuilder {
         let is_followed = segment == now.segment;
         self.unseen_m += if is_followed { since_s * now.speed_mps } else { f64::INFINITY };
         let is_held = now.speed_mps < self.settings.speed_min_mps;
-        self.was_held |= is_held;
-        let lagging = (-since_s / self.settings.brake_lag_s).exp();
-        // A standing train is held by friction, whose force is in proportion to the pressure.
-        let left = if self.was_held { lagging.min(self.pressure_left) } else { lagging };
-        self.is_braking |= now.brake > RELEASED;
-        self.is_braking &= now.traction <= RELEASED;
-        self.is_stopping = self.is_braking && now.speed_mps < FRICTION_MPS && !is_held;
-        let followed = now.brake + left * (self.followed - now.brake);
-        self.followed = if self.is_stopping { followed.max(self.followed) } else { followed };
-    }
-
-    /// Returns how far a reported brake force may be off; its error goes on while no brake acts.
-    fn brake_error(&mut self, brake: f64, learned: &BrakeErrors) -> BrakeError {
-        let lacking = brake - self.followed;
-        self.was_held &= lacking < -RELEASED;
-        let following = match lacking >= 0.0 {
-            true => Following::Building,
-            false if self.was_held => Following::Starting,
-            false if self.is_stopping => Following::Stopping,
-            false => Following::Releasing,
-        };
-        let lateness = learned.late(following);
-        let expected = -lateness.mean * lacking;
-        let late = lateness.spread.std * lacking;
-        let scale = learned.scale.std * brake;
-        let square = late * late + scale * scale;
-        if square < BRAKE_STD_LEAST * BRAKE_STD_LEAST {
-            return BrakeError { following, late: expected, std: 0.0, lateness: 0.0, kept: 1.0 };
-        }
-        let before = std::mem::replace(&mut self.brake_angle, late.atan2(scale));
-        let renewals = std::mem::take(&mut self.renewals) + (self.brake_angle - before).abs();
-        BrakeError {
-            following,
-            late: expected,
-            std: square.sqrt(),
-            lateness: late * late / square,
-            kept: (-renewals).exp(),
-        }
+        self.slowest_brake.see(now, since_s, is_held, lags_s);
     }
 
     /// Begins a motion, and returns the map's error since the one before.
@@ -229,8 +141,8 @@ impl StepBuilder {
         let known = half_s * (from.known + to.known);
         // By the forces: the speed's noise changes it all the time.
         let changed_mps = (acting.impulses[0] - acting.impulses[1] - known).abs() / to.inertia;
-        self.renewals += changed_mps / BRAKE_ERROR_MPS + duration_s / BRAKE_ERROR_TIME_S;
-        let brake = self.brake_error(to.brake, &learned.brake);
+        self.slowest_brake.pass(changed_mps, duration_s);
+        let brake = self.slowest_brake.error(to.brake, &learned.brake);
         self.wind_s += duration_s;
         let wind = if self.wind_s < WIND_STEP_S {
             (1.0, 0.0)
@@ -270,6 +182,7 @@ mod tests {
     use dynocar_model::train::Davis;
 
     const SECOND_NS: i64 = 1_000_000_000;
+    const LAGS_S: [f64; 2] = [1.5; 2];
 
     /// A train that coasts.
     fn coasting(time_ns: i64, speed_mps: f64) -> UnitSample {
@@ -303,10 +216,10 @@ mod tests {
             let under_m = (speed_mps * time_s - 100.0 + noise_m).clamp(0.0, 100.0);
             UnitSample { known: 0.06 * under_m, ..coasting(k * SECOND_NS / rate_hz, speed_mps) }
         };
-        steps.see(&sample(0));
+        steps.see(&sample(0), &LAGS_S);
         let of_step = |k: i64| {
             let (from, to) = (sample(k - 1), sample(k));
-            steps.see(&to);
+            steps.see(&to, &LAGS_S);
             step(&mut steps, &from, &to).impulse_variance
         };
         (1..(400.0 / speed_mps) as i64 * rate_hz).map(of_step).sum()
@@ -320,8 +233,8 @@ mod tests {
             let learned = LearnedState::new(&settings, &resistance);
             let mut steps = StepBuilder::new(&settings, 100.0);
             let (from, to) = (coasting(0, speed_mps), coasting(SECOND_NS / 10, speed_mps));
-            steps.see(&from);
-            steps.see(&to);
+            steps.see(&from, &LAGS_S);
+            steps.see(&to, &LAGS_S);
             steps
                 .to((&from, &to), &ResolvedSample::coasting(), (0.0, &learned), &resistance)
                 .impulse_variance
@@ -338,9 +251,9 @@ mod tests {
             let sample = ResolvedSample::coasting();
             let first = steps.begin(&sample);
             assert_eq!((first.kept, first.std_permille), (0.0, 0.05), "half of it under 800 m");
-            steps.see(&coasting(0, 1.0));
+            steps.see(&coasting(0, 1.0), &LAGS_S);
             steps.begin(&sample);
-            between.iter().for_each(|it| steps.see(it));
+            between.iter().for_each(|it| steps.see(it, &LAGS_S));
             steps.begin(&sample).kept
         };
         assert_eq!(begun(&[coasting(60 * SECOND_NS, 0.0)]), 1.0);
@@ -354,9 +267,9 @@ mod tests {
         // The standard deviation of the brake force 10 s after the end of its report.
         let std = |speed_mps: f64, traction: f64| {
             let mut steps = StepBuilder::new(&TrainKalmanSettings::default(), 100.0);
-            steps.see(&UnitSample { brake: 30.0, ..coasting(0, speed_mps) });
+            steps.see(&UnitSample { brake: 30.0, ..coasting(0, speed_mps) }, &LAGS_S);
             let after = |k: i64| UnitSample { traction, ..coasting(k * SECOND_NS / 10, speed_mps) };
-            (1..=100).for_each(|k| steps.see(&after(k)));
+            (1..=100).for_each(|k| steps.see(&after(k), &LAGS_S));
             let step = step(&mut steps, &after(99), &after(100));
             step.brake_std / step.duration_s
         };
@@ -370,11 +283,11 @@ mod tests {
         let std = |pressure_pa: fn(f64) -> Option<f64>| {
             let mut steps = StepBuilder::new(&TrainKalmanSettings::default(), 100.0);
             steps.see_pressure(pressure_pa(0.0));
-            steps.see(&UnitSample { brake: 30.0, ..coasting(0, 0.0) });
+            steps.see(&UnitSample { brake: 30.0, ..coasting(0, 0.0) }, &LAGS_S);
             let after = |k: i64| UnitSample { traction: 5.0, ..coasting(k * SECOND_NS / 10, 1.0) };
             for k in 1..=10 {
                 steps.see_pressure(pressure_pa(0.1 * k as f64));
-                steps.see(&after(k));
+                steps.see(&after(k), &LAGS_S);
             }
             let step = step(&mut steps, &after(9), &after(10));
             step.brake_std / step.duration_s

@@ -14,24 +14,28 @@ use crate::pipeline::{Estimator, KeptEstimate};
 
 /// Drives a train of 100 t declared and 110 t true for a time, and returns the answer.
 fn driven(estimator: &mut TrainKalman, from_s: u32, duration_s: u32) -> ParameterSnapshot {
-    braked(estimator, from_s, duration_s, 1.0)
+    braked(estimator, from_s, duration_s, (1.0, 0.1))
 }
 
-/// The same with a brake that exerts a share of the force that it reports.
+/// The same with a brake that exerts a share of the force that it reports, and releases with a time constant in s.
 fn braked(
     estimator: &mut TrainKalman,
     from_s: u32,
     duration_s: u32,
-    share: f64,
+    (share, release_s): (f64, f64),
 ) -> ParameterSnapshot {
     let (w0, gain) = (2.0, 9.806_65e-3 / 1.06);
-    let push = |second: f64| -> f64 { [40.0, 0.0, -40.0, 0.0][(second / 15.0) as usize % 4] };
+    // The traction makes up for the brake that is still being released.
+    let traction = 40.0 * (1.0 + release_s / 15.0);
+    let push = |second: f64| -> f64 { [traction, 0.0, -40.0, 0.0][(second / 15.0) as usize % 4] };
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(u64::from(from_s));
-    let mut speed_mps = 20.0;
+    let (mut speed_mps, mut brake) = (20.0, 0.0);
     let (mut admission, mut snapshot) = (admission(), ParameterSnapshot::empty());
     for tick in 10 * from_s..10 * (from_s + duration_s) {
         let second = 0.1 * f64::from(tick);
-        let force = (push(second).max(0.0) + share * push(second).min(0.0)) / 1.1;
+        let reported = share * (-push(second)).max(0.0);
+        brake = reported.max(brake + 0.1 / release_s * (reported - brake));
+        let force = (push(second).max(0.0) - brake) / 1.1;
         speed_mps += 0.1 * gain * (force - w0);
         let coasting = ResolvedSample::coasting();
         let sample = ResolvedSample {
@@ -119,9 +123,22 @@ fn a_brake_that_exerts_less_than_reported_leaves_the_mass_right() {
     for share in [0.9, 0.5] {
         let mut estimator = estimator();
         driven(&mut estimator, 0, 120);
-        let after = braked(&mut estimator, 120, 300, share);
+        let after = braked(&mut estimator, 120, 300, (share, 0.1));
         let mass_t = after.values[3];
         assert!((mass_t / 110.0 - 1.0).abs() < 0.01, "{share}: {mass_t}");
+    }
+}
+
+#[test]
+fn a_brake_that_releases_slowly_as_by_air_leaves_the_mass_right() {
+    for release_s in [3.0, 5.0, 8.0] {
+        let after = braked(&mut estimator(), 0, 900, (1.0, release_s));
+        let (mass_t, std_t) = (after.values[3], after.covariance[packed_index(3, 3)].sqrt());
+        assert!(
+            (mass_t - 110.0).abs() < 2.0 * std_t && std_t < 2.0,
+            "{release_s}: {mass_t} {std_t}"
+        );
+        assert_eq!(after.status(), Status::Estimated);
     }
 }
 
