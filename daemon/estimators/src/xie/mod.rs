@@ -269,6 +269,11 @@ impl<E: Expectation> Engine for EmWindow<E> {
         self.noise.measured_distance_m2 = variance_m2;
     }
 
+    /// A force that lacks early counts twice in the distance over a window.
+    fn lacking_share(&self) -> f64 {
+        2.0
+    }
+
     fn estimate(&self) -> Option<BrakingEstimate> {
         self.estimate
     }

@@ -11,6 +11,8 @@ pub const GAIN_LEAST: f64 = adhesion::DECLARED_BRAKE_STD;
 
 /// Standard deviation of the scale of a reported brake force, from train to train.
 pub const USUAL_STD: f64 = 0.02;
+/// Time constant in s of the slowest brake that needs no setting of its own.
+pub const SLOWEST_S: f64 = 1.5;
 
 /// The force builds up over this time in s.
 pub const BUILD_UP_S: f64 = 10.0;

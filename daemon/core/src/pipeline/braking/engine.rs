@@ -1,6 +1,6 @@
 //! Common parts of the estimators of a braking coefficient.
 
-use dynocar_model::terms::adhesion;
+use dynocar_model::terms::{adhesion, brake};
 use dynocar_shared::Uncertain;
 
 use super::motion::{MotionNoise, StepInputs};
@@ -40,6 +40,8 @@ settings! {
         position_is_wheel_independent: bool = false;
         /// Standard deviation over value of the declared brake force.
         demand_relative_std: f64 = adhesion::DECLARED_BRAKE_STD => (above 0);
+        /// Time in s within which a reported brake force builds up, as a time constant; 0 where it is the acting one.
+        brake_lag_s: f64 = brake::SLOWEST_S => (0 to 60 "s");
         /// Greatest standard deviation over value of an estimate that counts.
         relative_std_max: f64 = 0.15 => (above 0);
         /// Age in s at which an estimate is stale.
@@ -141,6 +143,16 @@ pub trait Engine: Send {
 
     /// Takes the variance of a measured distance in m² for another one from the next step on.
     fn set_distance_variance(&mut self, variance_m2: f64);
+
+    /// Returns the time in s by which the estimate lies back.
+    fn lag_s(&self) -> f64 {
+        0.0
+    }
+
+    /// Returns by how much of the force that a braking lacks on the average an estimate is low.
+    fn lacking_share(&self) -> f64 {
+        1.0
+    }
 
     /// Returns the estimate, once there is one.
     fn estimate(&self) -> Option<BrakingEstimate>;

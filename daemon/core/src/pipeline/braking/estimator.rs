@@ -30,6 +30,8 @@ pub struct BrakingEstimator<E> {
     reason: Reason,
     /// The last estimate that counts, else the last of all.
     held: Option<BrakingEstimate>,
+    /// Part of its demand that a slow brake had not built up.
+    held_lacking: f64,
     /// False while the held estimate is of an earlier braking or of the time before a change.
     is_current: bool,
     updated_ns: i64,
@@ -62,6 +64,7 @@ impl BrakingSettings {
             innovations: InnovationMonitor::new(INNOVATION_MEMORY),
             reason: Reason::TooFewSamples,
             held: None,
+            held_lacking: 0.0,
             is_current: false,
             updated_ns: 0,
             now_ns: 0,
@@ -114,6 +117,8 @@ impl<E: Engine> BrakingEstimator<E> {
                 self.speeds = SpeedRange::default();
             }
             self.held = Some(estimate);
+            self.held_lacking =
+                self.engine.lacking_share() * self.intake.lacking(self.engine.lag_s());
             self.is_current = counts;
             self.updated_ns = self.now_ns;
             self.reason = Reason::None;
@@ -129,8 +134,9 @@ impl<E: Engine> BrakingEstimator<E> {
     /// Returns whether the rail carries less than the brake would need, so that the coefficient is that
     /// of the rail and not only a lower bound of it.
     fn is_rail_limited(&self, estimate: &BrakingEstimate) -> bool {
-        // A brake that does more than it reports, or a lighter train than is known, leaves no rail that limits it.
-        if estimate.coefficient.value >= estimate.demand {
+        // A brake that does more than it reports, or a lighter train than is known, leaves no rail that limits it; nor
+        // is one known while a slow brake would do no more.
+        if estimate.coefficient.value + self.held_lacking >= estimate.demand {
             return false;
         }
         if let Some(probability) = estimate.brake_limited {

@@ -21,6 +21,9 @@ pub enum BrakingCoefficient {
 /// Traction per weight below which nothing pulls: a lagging actuator never releases completely.
 const PULLING_MIN_PER_WEIGHT: f64 = 1e-4;
 
+/// Share of its demand from which a brake has built up.
+const BUILT_SHARE: f64 = 0.95;
+
 /// Outcome of a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Intake {
@@ -103,6 +106,30 @@ struct Braking {
     segment: u32,
     origin_m: f64,
     collected: Collected,
+    build_up: BuildUp,
+}
+
+/// Coefficient that a brake as slow as may be lacked of its demand since a braking began.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct BuildUp {
+    /// As it has built up.
+    built: f64,
+    /// Sum over time in s of the part that lacks.
+    lacking_s: f64,
+    braked_s: f64,
+    /// Time in s since it has nearly built up.
+    built_s: f64,
+}
+
+impl BuildUp {
+    fn add(&mut self, demand: f64, step_s: f64, lag_s: f64) {
+        let left = if lag_s > 0.0 { (-step_s / lag_s).exp() } else { 0.0 };
+        self.built = demand + left * (self.built - demand);
+        self.lacking_s += step_s * (demand - self.built).max(0.0);
+        self.braked_s += step_s;
+        let is_building = self.built < BUILT_SHARE * demand;
+        self.built_s = if is_building { 0.0 } else { self.built_s + step_s };
+    }
 }
 
 impl BrakingIntake {
@@ -144,6 +171,9 @@ impl BrakingIntake {
         };
         if let Some(braking) = &mut self.braking {
             braking.collected.add(known, sample.step_s);
+            let is_acting = self.gear.is_some() && sample.brake_cylinder_pressure_pa.is_some();
+            let lag_s = if is_acting { 0.0 } else { self.settings.brake_lag_s };
+            braking.build_up.add(known.demand, sample.step_s, lag_s);
         }
         let Some(position_m) = sample.position_m else {
             return Intake::Missing(Reason::MissingQuantity);
@@ -154,7 +184,8 @@ impl BrakingIntake {
         let along_m = sample.direction * position_m;
         let Some(braking) = &mut self.braking else {
             let (segment, collected) = (sample.segment, Collected::from(known));
-            self.braking = Some(Braking { segment, origin_m: along_m, collected });
+            let build_up = BuildUp::default();
+            self.braking = Some(Braking { segment, origin_m: along_m, collected, build_up });
             return Intake::Start(observation(sample, 0.0, &known));
         };
         // A little less, so that jitter of the clock does not halve the rate.
@@ -164,6 +195,15 @@ impl BrakingIntake {
         let inputs = braking.collected.inputs();
         braking.collected = Collected::from(known);
         Intake::Step(inputs, observation(sample, along_m - braking.origin_m, &known))
+    }
+
+    /// Returns how much of the demanded coefficient a brake that builds up slowly lacked on the average of the braking,
+    /// infinite where it still built up as many s ago; none of it says anything of the rail.
+    pub fn lacking(&self, lag_s: f64) -> f64 {
+        self.braking.map_or(0.0, |Braking { build_up, .. }| match build_up.built_s > lag_s {
+            true => build_up.lacking_s / build_up.braked_s,
+            false => f64::INFINITY,
+        })
     }
 
     /// Returns the modelled values at a sample; `Ok(None)` while the train does not brake.

@@ -264,6 +264,10 @@ impl Engine for Tracker {
         self.model.noise.measured_distance_m2 = variance_m2;
     }
 
+    fn lag_s(&self) -> f64 {
+        self.lag_s
+    }
+
     fn estimate(&self) -> Option<BrakingEstimate> {
         // Half a millisecond of tolerance for the rounding of summed steps.
         let until_s = self.time_s - self.lag_s + 5e-4;

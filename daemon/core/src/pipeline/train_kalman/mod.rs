@@ -10,7 +10,7 @@
 //! that took the mass for exact would put its error into the resistance, and the other way round; here each is known as
 //! well as the other allows, and their covariance says how they depend on each other.
 
-use dynocar_model::terms::{delay, masses, traction};
+use dynocar_model::terms::{brake as usual_brake, delay, masses, traction};
 
 use crate::settings;
 
@@ -55,7 +55,7 @@ settings! {
         brake_scale_std: f64 = 0.3 => (0.000001 to 1);
         /// Time in s within which the brake follows its report, as a time constant; a faster one is none
         /// the worse.
-        brake_lag_s: f64 = 1.5 => (0.01 to 60 "s");
+        brake_lag_s: f64 = usual_brake::SLOWEST_S => (0.01 to 60 "s");
         /// Standard deviation in m/s of the wind of the day along the line; gusts have half of it.
         wind_std_mps: f64 = 1.5 => (0 to 20 "m/s");
         /// Standard deviation in s of the delay of a force behind its report.

@@ -3,7 +3,7 @@ use dynocar_core::pipeline::braking::settings::{
 };
 use dynocar_estimators::EstimatorSettings;
 use dynocar_estimators::xie::{EStep, EmSettings};
-use dynocar_shared::{Parameter, PipelineKind, Reason, Status};
+use dynocar_shared::{Parameter, PipelineKind, Reason, SampleField, Status};
 
 use super::simulation::{DEMAND, FULL_BRAKING, FULL_PRESSURE_PA, Run, after, dry, pipeline, wet};
 
@@ -76,6 +76,28 @@ fn a_brake_that_is_applied_slowly_is_not_taken_for_low_adhesion() {
             if snapshot.status() == Status::Estimated {
                 panic!("{kind} gives a number at {} s: {snapshot:?}", moment.time_s);
             }
+        }
+    }
+}
+
+#[test]
+fn a_brake_that_acts_behind_its_report_is_not_taken_for_low_adhesion() {
+    let run = Run {
+        adhesion: |_, speed_mps| dry(speed_mps),
+        pressure_pa: |time_s| FULL_PRESSURE_PA * (1.0 - (-time_s / 1.5).exp()),
+        ..FULL_BRAKING
+    };
+    let causal = SmootherSettings { lag_s: 0.0, ..Default::default() };
+    let all = adhesion_settings().into_iter();
+    for settings in all.chain([EstimatorSettings::AdhesionSmoother(causal)]) {
+        let kind = settings.kind();
+        let mut pipeline = pipeline(&settings);
+        for mut moment in run.simulate(3) {
+            moment.sample.valid &= !SampleField::BrakeCylinderPressure.bit();
+            moment.sample.set(SampleField::BrakeForce, 494_973.0);
+            let snapshot = *pipeline.process(&moment.sample);
+            let at_s = moment.time_s;
+            assert_ne!(snapshot.status(), Status::Estimated, "{kind} at {at_s} s: {snapshot:?}");
         }
     }
 }
@@ -159,7 +181,6 @@ fn the_law_pipeline_reports_the_scale_of_the_law_that_holds() {
 
 #[test]
 fn without_a_pressure_the_reported_brake_force_is_the_demand() {
-    use dynocar_shared::SampleField;
     let mut moments = WET.simulate(7);
     for moment in &mut moments {
         moment.sample.valid &= !SampleField::BrakeCylinderPressure.bit();
