@@ -2,8 +2,7 @@
 
 use dynocar_model::track::Track;
 
-use super::runs::{FoundIntervals, best_runs};
-use super::site::Inside;
+use super::site::{FoundIntervals, Inside, best_runs};
 use crate::explain::evidence::{Bin, RunData};
 use crate::explain::scan::{Scan, Tuple};
 use crate::parallel;
