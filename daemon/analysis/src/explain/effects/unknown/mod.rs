@@ -1,17 +1,15 @@
 //! A residual that is real but fits no kind of the library: an extra force of some form, or in a range of some
 //! covariate. The kind has no name, so that the answer states the form.
 //!
-//! - [`grammar`]: the forms that are tried; [`known`]: the values of a covariate; [`shape`]: the gain of a form
-//! - [`form`]: a force of such a form, of which some numbers are estimated; [`scale`]: whether that is more than a wrong
-//!   scale of a control force
+//! - [`grammar`]: the forms that are tried, and the gain of each; [`known`]: the values of a covariate
+//! - [`form`]: a force of such a form, of which some numbers are estimated, and whether it is more than a wrong scale of a
+//!   control force
 //! - [`band`]: a force in a range of a covariate
 
 mod band;
 mod form;
 mod grammar;
 mod known;
-mod scale;
-mod shape;
 
 use super::{Candidate, Certainty, Policy, Proposal};
 use crate::explain::evidence::SCORE_MIN;
