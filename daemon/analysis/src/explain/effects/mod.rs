@@ -1,4 +1,4 @@
-//! The library of effects, declared beforehand: one file for each kind.
+//! The library of effects, declared beforehand: one file for each kind, or for kinds of one law.
 //!
 //! A kind ([`Effect`]) proposes [`Hypothesis`] structures for the data at hand: certain tunnels, an interval, some
 //! windows. A hypothesis changes the forces on the train, for given parameters, by the law of its term
@@ -7,7 +7,6 @@
 //! the search treats it. A new kind is one file, one line in [`LIBRARY`] and a row among the kinds of
 //! `dynocar_shared::vocabulary`.
 
-mod actuator_delay;
 mod ambient_temperature;
 mod bearing_temperature;
 mod curve_resistance;
@@ -22,11 +21,9 @@ mod low_adhesion;
 mod mass_change;
 mod proposal;
 mod rotating_mass;
-mod speed_delay;
 mod tunnel_drag;
 mod unknown;
 mod usual_errors;
-mod vertical_curves;
 mod wheel_diameter;
 mod wind;
 
@@ -38,19 +35,18 @@ pub use super::hypothesis::{
     SharedHypothesis, Turn,
 };
 pub use gradient_error::map_error;
-pub use gradient_under_train::{mass_centre, rounded_steps};
+pub use gradient_under_train::{VerticalCurves, mass_centre, rounded_steps};
 pub use proposal::{
     Candidate, Certainty, DeclaredFigure, Effect, Everyday, Policy, Proposal, Whole,
 };
 pub use usual_errors::{map_error_as_fitted, usual_errors};
-pub use vertical_curves::VerticalCurves;
 
 /// Every kind, in the order of the search: timing, scales, mass and gain, effects tied to a place, environment,
 /// actuators. Forces outside the library come last.
 pub const LIBRARY: &[Effect] = &[
-    Effect::new(ActuatorDelay, actuator_delay::of_both, Whole::None).with(&actuator_delay::POLICY),
-    Effect::new(BrakeDelay, actuator_delay::of_brake, Whole::None).with(&actuator_delay::OF_BRAKE),
-    Effect::new(SpeedDelay, speed_delay::propose, Whole::None).with(&speed_delay::POLICY),
+    Effect::new(ActuatorDelay, lateness::of_forces, Whole::None).with(&lateness::OF_FORCES),
+    Effect::new(BrakeDelay, lateness::of_brake, Whole::None).with(&lateness::OF_BRAKE),
+    Effect::new(SpeedDelay, lateness::of_speed, Whole::None).with(&lateness::OF_SPEED),
     Effect::new(WheelDiameter, wheel_diameter::propose, Whole::First).with(&wheel_diameter::POLICY),
     Effect::new(TractionGain, force_gain::of_traction, Whole::First).with(&force_gain::OF_TRACTION),
     Effect::new(BrakeGain, force_gain::of_brake, Whole::None).with(&force_gain::OF_BRAKE),
