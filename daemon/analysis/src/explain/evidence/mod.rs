@@ -16,7 +16,6 @@ mod loads;
 mod model;
 mod noise;
 mod noise_search;
-mod pass;
 mod positions;
 mod run_data;
 mod run_scatter;

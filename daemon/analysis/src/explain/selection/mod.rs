@@ -8,7 +8,6 @@ mod outside;
 mod revision;
 mod search;
 mod small;
-mod sources;
 mod trying;
 
 pub use acceptance::deciding_score;
@@ -16,9 +15,10 @@ pub use deviations::{
     Deviations, EFFECT_FORM_SHARE, deviations, deviations_with_nuisance, enlarged_by_scatter,
     few_runs_factor, std_with_forms, without_each_run,
 };
-pub use nuisance::{deviations_given, is_certain_with_nuisance, move_to_nuisance_fit};
+pub use nuisance::{
+    ScaleSources, deviations_given, is_certain_with_nuisance, move_to_nuisance_fit,
+};
 pub use outcome::{
     EffectTrial, NuisanceFit, Refusal, SearchOutcome, discounted, model_penalty, penalty,
 };
 pub use search::{OBSERVATIONS_MIN, Progress, Search};
-pub use sources::ScaleSources;
