@@ -5,10 +5,9 @@
 //!
 //! # Layout
 //!
-//! - [`live`]: reads the channels and serves until it is asked to end
+//! - [`cli`]: the command line; reads the channels and serves until it is asked to end
 //! - [`viewers`]: channels that are advertised while somebody writes them, their messages, the number of samples that
 //!   viewers get, and reports about viewers that do not keep up
-//! - [`cli`]: the command line
 //!
 //! # Examples
 //!
@@ -19,5 +18,4 @@
 //! ```
 
 pub mod cli;
-pub mod live;
 pub mod viewers;
