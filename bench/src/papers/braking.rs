@@ -222,3 +222,6 @@ pub fn declared(sought: BrakingCoefficient) -> f64 {
         BrakingCoefficient::Ratio => gear.ratio,
     }
 }
+
+#[cfg(test)]
+mod tests;

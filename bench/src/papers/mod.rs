@@ -5,8 +5,6 @@ mod bound;
 pub mod braking;
 mod braking_score;
 mod braking_table;
-#[cfg(test)]
-mod literal_em_tests;
 mod liu;
 mod row;
 mod wang;

@@ -23,13 +23,11 @@
 //! instant of stopping and of starting is found within the step, and the time at rest adds nothing.
 //! [`OpenLoopRecording`] describes the further treatment of stops and gaps.
 
-#[cfg(test)]
-mod analytic_tests;
-#[cfg(test)]
-mod gap_tests;
 pub mod motion;
 mod prediction;
 mod recording;
+#[cfg(test)]
+mod tests;
 
 pub use prediction::{MOVING_SPEED_MPS, Prediction, Restart, STANDING_MPS, SpeedError, departs};
 pub use recording::{

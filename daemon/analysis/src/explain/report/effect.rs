@@ -362,3 +362,6 @@ pub fn verdict_words(
     };
     VerdictWords { heading: heading + ".", whole: whole + ".", left }
 }
+
+#[cfg(test)]
+mod tests;

@@ -16,8 +16,6 @@
 
 pub mod covariates;
 pub mod effect;
-#[cfg(test)]
-mod effect_tests;
 pub mod errors;
 pub mod panels;
 pub mod parameters;

@@ -14,7 +14,7 @@ use dynocar_core::pipeline::braking::law::BrakingLaw;
 use dynocar_core::pipeline::braking::motion::{self, StepInputs};
 use dynocar_model::train::TrainModel;
 
-use super::braking::{
+use super::{
     BrakingMoment, POSITION_NOISE_M, POSITION_STD_M, SPEED_NOISE_MPS, STEP_S, WINDOW, XIE_TABLE_2,
     train,
 };

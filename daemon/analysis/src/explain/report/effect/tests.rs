@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use dynocar_model::words;
 
-use super::effect::*;
+use super::*;
 use crate::explain::answer::{
     CovariateRange, EffectAnswer, EffectMeaning, FoundMassSection, Location, ParameterValue,
     PlaceUncertainty, RunWindow, WithStd,
