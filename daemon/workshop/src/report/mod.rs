@@ -5,7 +5,7 @@
 //!
 //! - [`mod@page`]: the page from top to bottom; the survey's and the learner's have its head and policy too; and
 //!   its plots as separate files
-//! - [`sections`]: the sections of the page
+//! - [`sections`]: the sections of the page, and their subject
 //! - [`plots`]: the plots, as SVG text
 //! - [`html`]: parts of pages: tables, sections, numbers
 //! - [`provenance`]: command, versions, content hash
@@ -17,15 +17,13 @@ pub mod page;
 pub mod plots;
 pub mod provenance;
 pub mod sections;
-mod subject;
 
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::Explanation;
 
-pub use subject::Subject;
-
 use plots::PlotError;
 use provenance::Provenance;
+use sections::Subject;
 
 /// How every page begins.
 pub const PAGE_MARK: &str = "<!DOCTYPE html>";

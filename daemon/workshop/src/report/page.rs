@@ -14,11 +14,10 @@ use dynocar_core::plausibility::Severity;
 use dynocar_model::words;
 use sha2::{Digest, Sha256};
 
-use super::Subject;
 use super::html::{chance, escape, section};
 use super::plots::{Plot, PlotError, Width, as_file, colour_rules, line, panel, series, speeds};
 use super::provenance::Provenance;
-use super::sections::{PageSection, errors, model, quality, residual};
+use super::sections::{PageSection, Subject, errors, model, quality, residual};
 use crate::run_facts::tonnes;
 
 const STYLE: &str = include_str!("style.css");

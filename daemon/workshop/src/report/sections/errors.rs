@@ -6,8 +6,7 @@ use dynocar_analysis::explain::report::errors::{ErrorPair, Resampling, RunErrors
 use dynocar_analysis::explain::report::timeline::Trace;
 use dynocar_analysis::explain::stop_to_stop::{Judged, StopToStop, reduction};
 
-use super::PageSection;
-use crate::report::Subject;
+use super::{PageSection, Subject};
 use crate::report::html::ColumnAlignment::{Names, Numbers, Words};
 use crate::report::html::{
     TableColumn, details, escape, estimate, legend, marked_table, percent, table,

@@ -6,8 +6,7 @@ use dynocar_analysis::explain::report::parameters::{ParameterRow, PlaceRow, Plac
 use dynocar_analysis::explain::report::sentence::CandidateRow;
 use dynocar_model::words::{joined, number};
 
-use super::PageSection;
-use crate::report::Subject;
+use super::{PageSection, Subject};
 use crate::report::html::ColumnAlignment::{Numbers, Words};
 use crate::report::html::{self, TableColumn, escape, estimate, marked_table, minus};
 

@@ -5,8 +5,7 @@ use std::collections::BTreeMap;
 use dynocar_analysis::dataset::{OrderCounts, Run};
 use dynocar_analysis::explain::evidence::RunData;
 
-use super::PageSection;
-use crate::report::Subject;
+use super::{PageSection, Subject};
 use crate::report::html::ColumnAlignment::{Names, Numbers, Words};
 use crate::report::html::{TableColumn, count, details, escape, grouped, table};
 use crate::report::provenance::{FileDigest, Provenance};

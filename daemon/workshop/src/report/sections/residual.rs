@@ -2,8 +2,7 @@
 
 use dynocar_analysis::explain::report::covariates::Covariate;
 
-use super::PageSection;
-use crate::report::Subject;
+use super::{PageSection, Subject};
 use crate::report::html::{escape, legend};
 use crate::report::plots::{PlotError, figure, line, panel, wide_and_narrow};
 
