@@ -6,7 +6,7 @@ use dynocar_model::train::PowerTrain;
 use toml::Value;
 
 use super::clock_faults::{DAY_S, HALF_DAY_S, HOUR_S};
-use super::column_faults::column_faults;
+use super::column_faults::{column_faults, stuck_columns};
 use super::diagnostic::{Diagnostic, implausible_columns, read_as};
 use super::force_faults::force_faults;
 use super::forces::{Force, ForceSource};
@@ -14,7 +14,6 @@ use super::position_faults::of_position;
 use super::quality::{Judge, RunQuality};
 use super::quantity::Quantity;
 use super::resolved::{Context, GradientSource, Resolved};
-use super::stuck::stuck_columns;
 
 /// Usual median time steps in s of recordings.
 const USUAL_STEP_S: (f64, f64) = (0.0005, 60.0);

@@ -5,11 +5,11 @@ use dynocar_model::train::{EffortCurve, TrainModel};
 use dynocar_shared::resistance::GRAVITY_MPS2;
 use toml::Value;
 
+use super::column_faults::{WINDOWS_MIN, Windows, moved_mps2};
 use super::diagnostic::Diagnostic;
 use super::forces::{Force, ForceSource};
 use super::quantity::Quantity;
 use super::resolved::{Context, Resolved};
-use super::stuck::{WINDOWS_MIN, Windows, moved_mps2};
 
 /// Force in N below which a force counts as zero.
 const ZERO_N: f64 = 1.0;

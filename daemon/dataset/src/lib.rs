@@ -54,7 +54,6 @@ pub mod quantity;
 mod resolved;
 pub mod run;
 mod speed_and_position;
-mod stuck;
 mod table;
 pub mod text_layout;
 pub mod track_file;
