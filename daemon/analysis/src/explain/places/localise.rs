@@ -2,7 +2,8 @@
 
 use dynocar_model::track::Track;
 
-use super::site::{FoundIntervals, Inside, best_runs};
+use super::runs::{FoundIntervals, best_runs};
+use super::site::Inside;
 use crate::explain::evidence::{Bin, RunData};
 use crate::explain::scan::{Scan, Tuple};
 use crate::parallel;

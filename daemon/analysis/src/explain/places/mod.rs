@@ -8,9 +8,11 @@
 //!   that the effect acts in it
 
 mod localise;
+mod runs;
 mod settle;
 mod site;
 
 pub use localise::{ErrorScale, MAP, MAP_ERROR_PERMILLE, SURVEYED, UNSURVEYED, find, span_m};
+pub use runs::{FoundIntervals, best_of_runs};
 pub use settle::settle;
-pub use site::{Axis, FoundIntervals, Inside, IntervalEnd, Intervals, Reach, Site, best_of_runs};
+pub use site::{Axis, Inside, IntervalEnd, Intervals, Reach, Site};
