@@ -5,9 +5,10 @@
 //!
 //! # Layout
 //!
-//! - [`cli`]: the command line; reads the channels and serves until it is asked to end
+//! - [`live`]: reads the channels and serves until it is asked to end
 //! - [`viewers`]: channels that are advertised while somebody writes them, their messages, the number of samples that
 //!   viewers get, and reports about viewers that do not keep up
+//! - [`cli`]: the command line
 //!
 //! # Examples
 //!
@@ -18,4 +19,5 @@
 //! ```
 
 pub mod cli;
+pub mod live;
 pub mod viewers;
