@@ -269,8 +269,9 @@ enum {
     /* Wheel slide or wheel spin: the speed is not the train's */
     DYNOCAR_REJECTED_WHEEL_SLIDE = 13,
     DYNOCAR_REJECTED_OUT_OF_RANGE = 14, /* Another quantity lies outside its physical range */
-    /* A moving train has sent the same speed, place and forces for more than 2.5 s */
-    DYNOCAR_REJECTED_FROZEN = 15
+    /* The sample before once more, or the same speed, place and forces of a moving train for
+     * more than 2.5 s */
+    DYNOCAR_REJECTED_REPEATED = 15
 };
 
 /* Manoeuvres that would show more: bits of missing_manoeuvres. */

@@ -318,7 +318,7 @@ mod refusal_log_tests {
         let mut named = Vec::new();
         for second in 0..130 {
             counts[RejectionReason::SpeedJump as usize] += 1;
-            counts[RejectionReason::Frozen as usize] += u32::from(second == 70);
+            counts[RejectionReason::Repeated as usize] += u32::from(second == 70);
             let now = start + Duration::from_secs(second);
             named.extend(log.look(&counts, now).into_iter().map(|it| (second, it.0, it.1)));
         }
@@ -328,7 +328,7 @@ mod refusal_log_tests {
                 (0, RejectionReason::SpeedJump, 1),
                 (60, RejectionReason::SpeedJump, 60),
                 (120, RejectionReason::SpeedJump, 60),
-                (120, RejectionReason::Frozen, 1),
+                (120, RejectionReason::Repeated, 1),
             ]
         );
     }

@@ -259,8 +259,8 @@ vocabulary! {
         WheelSlide = 13 "wheel_slide",
         /// Another quantity lies outside its physical range.
         OutOfRange = 14 "out_of_range",
-        /// A moving train has sent the same speed, place and forces for more than 2.5 s.
-        Frozen = 15 "frozen",
+        /// The sample before once more, or the same speed, place and forces of a moving train for more than 2.5 s.
+        Repeated = 15 "repeated",
     }
 }
 

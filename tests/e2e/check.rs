@@ -138,7 +138,7 @@ sources
 
 notes
   run 1: cells missing: traction_force 1, brake_force 1
-  run 1: refused by validation: time_not_increasing 1 (in 1.csv:6, at 3 s)
+  run 1: refused by validation: repeated 1 (in 1.csv:6, at 3 s)
 ";
 
 #[test]
@@ -235,7 +235,7 @@ fn json_on_standard_output_stands_alone() {
     assert_eq!((&answer["kind"], &answer["valid"]), (&"dataset".into(), &true.into()));
     let run = &answer["dataset"]["runs"][0];
     assert_eq!(run["quality"]["order"]["repeated"], 1);
-    assert_eq!(run["quality"]["refused"][0]["reason"], "time_not_increasing");
+    assert_eq!(run["quality"]["refused"][0]["reason"], "repeated");
     assert_eq!(run["gradient_source"], "track");
     assert_eq!(answer["train"]["mass_kg"], 100_000.0);
     assert_eq!(answer["track"]["gradient_range_permille"], serde_json::json!([-2.5, 3.0]));

@@ -186,7 +186,7 @@ class RejectionReason(_Vocabulary):
     OUTLIER = 12  # The estimator's outlier test refused the window
     WHEEL_SLIDE = 13  # Wheel slide or wheel spin: the speed is not the train's
     OUT_OF_RANGE = 14  # Another quantity lies outside its physical range
-    FROZEN = 15  # A moving train has sent the same speed, place and forces for more than 2.5 s
+    REPEATED = 15  # The sample before once more, or the same speed, place and forces of a moving train for more than 2.5 s
 
 
 class Manoeuvre(IntFlag):

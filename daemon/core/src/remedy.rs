@@ -56,7 +56,7 @@ pub const fn of_refusal(reason: RejectionReason) -> Option<&'static str> {
         RejectionReason::MassOutOfRange => "check the mass's unit, kg",
         RejectionReason::BadDirection => "send +1 or -1 as the direction",
         RejectionReason::OutOfRange => "check the units of pressure, temperature and gradient",
-        RejectionReason::Frozen => "look for a bus that repeats its last value",
+        RejectionReason::Repeated => "look for a bus or a sender that repeats its last values",
     })
 }
 

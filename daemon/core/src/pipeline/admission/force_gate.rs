@@ -168,7 +168,7 @@ impl ForceGate {
         // The content stays known, so that further repetitions of it are refused as well.
         (self.level, self.newest) = (newest, newest);
         self.skipped_s = f64::INFINITY;
-        GateVerdict::Refuse(RejectionReason::Frozen)
+        GateVerdict::Refuse(RejectionReason::Repeated)
     }
 
     /// Judges a sample by the level and by the reading before it.

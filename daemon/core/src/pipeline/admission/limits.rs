@@ -68,7 +68,9 @@ limits! {
     /// Step ahead in time that is believed within a run.
     TIME_STEP = Refused(RejectionReason::TimeJump), "step in time in s", 0.0 to 86_400.0, 0.0;
     /// Time for which a moving train repeats speed, place and forces; longer steps are not integrated over.
-    REPEATED = Refused(RejectionReason::Frozen), "time of repetition in s", 0.0 to 2.5, 0.0;
+    REPEATED = Refused(RejectionReason::Repeated), "time of repetition in s", 0.0 to 2.5, 0.0;
+    /// Copies of a sample that come in a row; more come from a sender that is stuck.
+    COPIES = Refused(RejectionReason::TimeNotIncreasing), "copies of a sample in a row", 0.0 to 100.0, 0.0;
     /// Innovation of an estimator; the fifth in a row beyond it is believed.
     INNOVATION = Refused(RejectionReason::Outlier), "innovation in standard deviations", -8.0 to 8.0, 2.6e-14;
     /// Change of force from one sample to the next, over the change that 20 % of them stay below: a force that exceeds

@@ -123,7 +123,11 @@ impl Admission {
         estimator: &mut dyn Estimator,
     ) -> Outcome {
         let valid = self.validator.check(sample);
-        self.invalid_share += (f64::from(valid.is_err()) - self.invalid_share) / REFUSALS_MEMORY;
+        // A copy says as much of the samples as the one that it copies, and that has been counted.
+        if !matches!(valid, Err(RejectionReason::Repeated)) {
+            let refused = f64::from(valid.is_err());
+            self.invalid_share += (refused - self.invalid_share) / REFUSALS_MEMORY;
+        }
         match valid {
             Ok(valid) => {
                 let resolved = resolver.resolve(&valid);

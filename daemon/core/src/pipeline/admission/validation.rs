@@ -10,7 +10,8 @@ use dynocar_shared::resistance::GRAVITY_MPS2;
 use dynocar_shared::{RejectionReason, SampleField, TrainId, TrainSample};
 
 use super::limits::{
-    ACCELERATION_MAX_MPS2, FORCE, MASS, POSITION_STEP, REPEATED, SPEED, SPEED_STEP, TIME_STEP,
+    ACCELERATION_MAX_MPS2, COPIES, FORCE, MASS, POSITION_STEP, REPEATED, SPEED, SPEED_STEP,
+    TIME_STEP,
 };
 
 /// After this many refusals in a row that agree with each other, the past is given up.
@@ -46,6 +47,8 @@ pub struct Validator {
     gap: Option<Gap>,
     last_refused: Option<TrainSample>,
     refusals_in_a_row: u32,
+    /// Copies of the newest sample in a row.
+    copies: u32,
     segment: u32,
     lost: u64,
 }
@@ -108,7 +111,11 @@ impl Validator {
         if sample.train_id != self.train {
             return Err(RejectionReason::WrongTrain);
         }
-        self.check_sequence(sample)?;
+        let counted = self.check_sequence(sample);
+        if self.is_copy(sample) {
+            return Err(RejectionReason::Repeated);
+        }
+        counted?;
         self.check_values(sample)?;
         match self.check_motion(sample) {
             Ok(step_s) => Ok(self.accept(sample, step_s)),
@@ -202,6 +209,14 @@ impl Validator {
         }
     }
 
+    /// Returns whether a sample is the one before it, sent once more: it adds nothing, and nothing in it is wrong.
+    fn is_copy(&mut self, sample: &TrainSample) -> bool {
+        let mut newest = [&self.last, &self.last_refused].into_iter().flatten();
+        let is_copy = newest.any(|it| says_the_same(it, sample));
+        self.copies = if is_copy { self.copies.saturating_add(1) } else { 0 };
+        is_copy && !COPIES.is_passed(f64::from(self.copies), 1.0)
+    }
+
     /// Returns the step in s since the last accepted sample, `None` when a new segment starts here.
     fn check_motion(&self, sample: &TrainSample) -> Result<Option<f64>, RejectionReason> {
         let Some(last) = &self.last else { return Ok(None) };
@@ -267,6 +282,13 @@ impl Validator {
         self.refusals_in_a_row = 0;
         ValidSample { sample, step_s: step_s.unwrap_or(0.0), segment: self.segment }
     }
+}
+
+/// Returns whether two samples have the same time and the same values.
+fn says_the_same(one: &TrainSample, other: &TrainSample) -> bool {
+    let head = |it: &TrainSample| (it.time_ns, it.run, it.direction, it.flags, it.valid);
+    let mut fields = SampleField::ALL.into_iter();
+    head(one) == head(other) && fields.all(|field| one.get(field) == other.get(field))
 }
 
 fn step_s(from: &TrainSample, to: &TrainSample) -> f64 {

@@ -137,7 +137,7 @@ fn what_a_moving_train_repeats_place_and_all_shows_nothing() {
     assert_eq!(all[11].2, 0.0, "after seconds of it the motion begins anew");
     let mut gate = ForceGate::default();
     let verdicts: Vec<_> = samples[..40].iter().map(|it| gate.judge(it)).collect();
-    assert_eq!(verdicts[39], GateVerdict::Refuse(RejectionReason::Frozen));
+    assert_eq!(verdicts[39], GateVerdict::Refuse(RejectionReason::Repeated));
     // A train that says nothing of its place may well hold its speed.
     samples.iter_mut().for_each(|it| it.position_m = None);
     assert_eq!(taken(&mut ForceGate::default(), &samples).len(), 60);

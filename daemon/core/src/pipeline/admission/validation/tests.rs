@@ -1,6 +1,14 @@
 //! The validator on good and bad samples.
 
+use std::sync::Arc;
+
+use dynocar_model::force::ForceResolver;
+use dynocar_model::train::{Davis, TrainModel};
+use dynocar_shared::ParameterSnapshot;
+
 use super::*;
+use crate::pipeline::Echo;
+use crate::pipeline::admission::Admission;
 
 const TRAIN: TrainId = TrainId(3);
 
@@ -74,8 +82,15 @@ fn a_position_off_the_line_is_refused_where_its_length_is_known() {
 fn repeated_and_reversed_samples_are_refused() {
     let mut validator = validator();
     validator.check(&cruising(5)).unwrap();
-    assert_eq!(validator.check(&cruising(5)), Err(RejectionReason::SequenceNotIncreasing));
-    let mut reversed = cruising(6);
+    let repeated = Err(RejectionReason::Repeated);
+    assert_eq!(validator.check(&cruising(5)), repeated, "its number, too");
+    let again = |index, sequence| TrainSample { sequence, ..cruising(index) };
+    assert_eq!(validator.check(&again(5, 7)), repeated);
+    let other = again(5, 8).with(SampleField::TractionForce, 5_001.0);
+    assert_eq!(validator.check(&other), Err(RejectionReason::TimeNotIncreasing), "no copy");
+    assert_eq!(validator.check(&TrainSample { sequence: 9, ..other }), repeated);
+    assert_eq!(validator.check(&again(5, 10)), repeated, "another one came between");
+    let mut reversed = again(6, 11);
     reversed.time_ns = cruising(3).time_ns;
     assert_eq!(validator.check(&reversed), Err(RejectionReason::TimeNotIncreasing));
 }
@@ -177,6 +192,57 @@ fn a_clock_set_back_is_refused_a_few_times_and_then_believed() {
     assert!(results[..5].iter().all(|r| *r == Err(RejectionReason::TimeNotIncreasing)));
     assert_eq!(results[5], Ok(2));
     assert!(results[6].is_ok());
+}
+
+#[test]
+fn a_clock_set_back_is_believed_where_each_sample_comes_twice() {
+    let mut validator = validator();
+    validator.check(&cruising(1000)).unwrap();
+    for copy in 0..12 {
+        let sample = TrainSample { sequence: 1002 + copy, ..cruising(copy / 2) };
+        let checked = validator.check(&sample).map(|valid| valid.segment);
+        match (copy / 2, copy % 2) {
+            (_, 1) => assert_eq!(checked, Err(RejectionReason::Repeated)),
+            (5, _) => assert_eq!(checked, Ok(2)),
+            _ => assert_eq!(checked, Err(RejectionReason::TimeNotIncreasing)),
+        }
+    }
+}
+
+#[test]
+fn a_sender_that_is_stuck_is_refused_as_one_whose_clock_stands() {
+    let mut validator = validator();
+    validator.check(&cruising(0)).unwrap();
+    let refused = |sequence| {
+        let sample = TrainSample { sequence, ..cruising(0) };
+        validator.check(&sample).unwrap_err()
+    };
+    let refusals: Vec<_> = (2..200).map(refused).collect();
+    let of_clock = refusals.iter().position(|it| *it == RejectionReason::TimeNotIncreasing);
+    assert_eq!(of_clock, Some(100));
+    assert!(refusals[100..].iter().all(|it| *it == RejectionReason::TimeNotIncreasing));
+}
+
+#[test]
+fn copies_say_nothing_against_the_samples_and_other_values_of_the_same_time_do() {
+    let train = Arc::new(TrainModel::bare("t", 100e3, Davis { a: 1.5, b: 0.0, c: 0.0 }));
+    for (more_n, is_doubted) in [(0.0, false), (500.0, true)] {
+        let mut admission = Admission::new(TRAIN, Arc::clone(&train));
+        let mut resolver = ForceResolver::new(Arc::clone(&train), None);
+        let mut sequence = 0;
+        let mut echo = Echo;
+        for index in 0..2000 {
+            for copy in 0..1 + u32::from(index % 4 == 0) {
+                sequence += 1;
+                let force_n = 5_000.0 + more_n * f64::from(copy);
+                let sample = cruising(index).with(SampleField::TractionForce, force_n);
+                let sample = TrainSample { sequence, ..sample };
+                admission.take(&sample, &mut resolver, &mut echo);
+            }
+        }
+        let known = admission.write(&echo, &mut ParameterSnapshot::empty());
+        assert_eq!(known.is_none(), is_doubted, "{more_n} N more in every fifth sample");
+    }
 }
 
 #[test]
