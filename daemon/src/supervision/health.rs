@@ -113,6 +113,15 @@ impl PipelineHealth {
         format!("{}{reason}{}", self.status, uses.collect::<String>())
     }
 
+    /// Returns the reason for most of the refusals that ask for something to be done, as a remedy. Repetitions come
+    /// last: most do no harm.
+    fn remedy_of_refusals(&self) -> Option<&'static str> {
+        let is_repeated = |reason: RejectionReason| reason == RejectionReason::Repeated;
+        let refused = || self.refused.iter().map(|it| it.0);
+        let others = refused().filter(|&it| !is_repeated(it));
+        others.chain(refused().filter(|&it| is_repeated(it))).find_map(of_refusal)
+    }
+
     fn verdict(&self) -> Verdict {
         if self.is_stale { Verdict::Stale } else { Verdict::new(self.status, self.reason) }
     }
@@ -175,13 +184,20 @@ impl TrainHealth {
         newest_sample_words(self.sample_age_s(), self.controller_process)
     }
 
-    /// Samples that cannot be true come first: a suspect may follow from them. A suspect says more than that the model lacks
-    /// something, and a reason for refusals more than that the input is bad.
+    /// The first of the things to be mended: samples that cannot be true, then samples that are refused, since a suspicion
+    /// may follow from either. A suspect says more than that the model lacks something, and a reason for refusals more
+    /// than that the input is bad.
     fn remedy_of_pipelines(&self) -> &'static str {
-        let is_implausible = |reason: &Reason| reason.is_implausible_input();
-        let implausible = self.pipelines.iter().find_map(|it| it.reason.filter(is_implausible));
+        let with = |is: fn(Reason) -> bool| {
+            self.pipelines.iter().filter(move |it| it.reason.is_some_and(is))
+        };
+        let implausible = with(Reason::is_implausible_input).find_map(|it| it.reason);
         if let Some(reason) = implausible {
             return of_reason(reason);
+        }
+        let refusing = || with(|reason| reason == Reason::BadInput);
+        if let Some(remedy) = refusing().find_map(PipelineHealth::remedy_of_refusals) {
+            return remedy;
         }
         let suspect = self.pipelines.iter().find_map(|it| it.suspicion?.effect);
         if let Some(effect) = suspect {
@@ -190,14 +206,7 @@ impl TrainHealth {
         let is_amiss = |it: &&PipelineHealth| it.verdict() == Verdict::Degraded;
         let starved = || self.pipelines.iter().find(|it| it.is_starved());
         let first = self.pipelines.iter().find(is_amiss).or_else(starved);
-        let Some(first) = first else { return Verdict::Degraded.remedy() };
-        match first.reason {
-            Some(Reason::BadInput) => {
-                let refusal = first.refused.iter().find_map(|it| of_refusal(it.0));
-                refusal.unwrap_or(of_reason(Reason::BadInput))
-            }
-            reason => of_reason(reason.unwrap_or(Reason::None)),
-        }
+        first.map_or(Verdict::Degraded.remedy(), |it| of_reason(it.reason.unwrap_or(Reason::None)))
     }
 }
 
@@ -270,121 +279,4 @@ fn pipelines_of(observed: &mut ObservedTrain) -> Vec<PipelineHealth> {
 }
 
 #[cfg(test)]
-mod tests {
-    use dynocar_shared::vocabulary::EffectKind;
-
-    use super::*;
-
-    #[test]
-    fn good_brakes_on_a_good_rail_are_no_degradation() {
-        let waiting = |reason| Verdict::new(Status::Unestimated, Some(reason));
-        assert_eq!(waiting(Reason::OnlyLowerBound), Verdict::Ok);
-        assert_eq!(waiting(Reason::EstimateStale), Verdict::Ok);
-        assert_eq!(waiting(Reason::BadInput), Verdict::Degraded, "samples that are refused");
-        let large = Verdict::new(Status::Degraded, Some(Reason::InnovationsTooLarge));
-        assert_eq!(large, Verdict::Degraded);
-        let silent = PipelineHealth { is_stale: true, ..pipeline(Reason::DaemonSilent) };
-        assert_eq!(silent.verdict(), Verdict::Stale);
-    }
-
-    #[test]
-    fn a_train_that_learns_nothing_for_lack_of_a_quantity_is_degraded() {
-        let waiting = |reason| PipelineHealth { status: Status::Unestimated, ..pipeline(reason) };
-        let known = PipelineHealth { status: Status::Estimated, ..pipeline(Reason::None) };
-        let starved = || waiting(Reason::MissingQuantity);
-        assert_eq!(verdict_of(&[starved(), waiting(Reason::TooFewSamples)]), Verdict::Degraded);
-        assert_eq!(
-            verdict_of(&[starved(), known]),
-            Verdict::Ok,
-            "a brake without a pressure sensor"
-        );
-        assert_eq!(
-            verdict_of(&[waiting(Reason::TooFewSamples)]),
-            Verdict::Ok,
-            "a train that stands"
-        );
-        let words = PipelineHealth {
-            uses: vec![(Quantity::Mass, UseState::Learning, "missing_quantity")],
-            ..starved()
-        };
-        assert!(words.in_words().ends_with("(missing_quantity): it ends with its reason"));
-    }
-
-    fn pipeline(reason: Reason) -> PipelineHealth {
-        PipelineHealth {
-            index: 0,
-            kind: "adhesion_law",
-            status: Status::Degraded,
-            reason: Some(reason),
-            uses: Vec::new(),
-            age_ms: 0,
-            is_stale: false,
-            sample_age_s: Some(0.02),
-            suspicion: None,
-            refused: Vec::new(),
-        }
-    }
-
-    #[test]
-    fn each_quantity_says_whether_it_may_be_used_why_and_what_ends_it() {
-        let held_back = PipelineHealth {
-            status: Status::Estimated,
-            uses: vec![
-                (Quantity::Resistance, UseState::Usable, "none"),
-                (Quantity::Mass, UseState::Confirming, "confirming"),
-            ],
-            ..pipeline(Reason::None)
-        };
-        let words = held_back.in_words();
-        assert!(words.starts_with("estimated; resistance usable; mass confirming: "), "{words}");
-        assert!(words.ends_with("up to 10 min"), "{words}");
-        let waiting = PipelineHealth {
-            status: Status::Unestimated,
-            uses: vec![(Quantity::Adhesion, UseState::Learning, "only_lower_bound")],
-            ..pipeline(Reason::OnlyLowerBound)
-        };
-        let words = waiting.in_words();
-        assert!(
-            words.ends_with("; adhesion learning (only_lower_bound): wheels that slide end it"),
-            "{words}"
-        );
-    }
-
-    #[test]
-    fn what_to_do_follows_what_is_known_best() {
-        let train = |verdict, pipelines| {
-            let (daemon, controller_process) = (None, Some(7));
-            let train = TrainId(1);
-            TrainHealth { train, verdict, daemon, controller_process, pipelines }.remedy()
-        };
-        let mut snapshot = dynocar_shared::ParameterSnapshot::empty();
-        snapshot.suspected_effect = EffectKind::DraggingBrake as u32;
-        let monitor = PipelineHealth {
-            suspicion: Suspicion::from_snapshot(&snapshot),
-            ..pipeline(Reason::InnovationsNotWhite)
-        };
-        let refusing = PipelineHealth {
-            refused: vec![(RejectionReason::WheelSlide, 9), (RejectionReason::SpeedJump, 4)],
-            ..pipeline(Reason::BadInput)
-        };
-        let large = pipeline(Reason::InnovationsTooLarge);
-        let degraded = |pipelines| train(Verdict::Degraded, pipelines);
-        assert!(degraded(vec![large.clone(), monitor]).contains("every brake releases"));
-        assert!(degraded(vec![large.clone(), refusing]).contains("explain"), "the first");
-        assert!(degraded(vec![pipeline(Reason::BadInput)]).contains("mend the samples"));
-        let fine =
-            PipelineHealth { status: Status::Unestimated, ..pipeline(Reason::OnlyLowerBound) };
-        let faults = PipelineHealth {
-            suspicion: Suspicion::from_snapshot(&snapshot),
-            ..pipeline(Reason::ImplausibleForces)
-        };
-        assert!(degraded(vec![fine, faults]).contains("unit, sign and order"));
-        let starved =
-            PipelineHealth { status: Status::Unestimated, ..pipeline(Reason::MissingQuantity) };
-        assert!(degraded(vec![starved]).contains("send what the pipeline needs"));
-        let parked = PipelineHealth { sample_age_s: Some(34.0), ..large.clone() };
-        assert!(train(Verdict::Ok, vec![parked]).contains("does the controller run"));
-        assert_eq!(train(Verdict::Ok, vec![large]), "nothing");
-        assert!(train(Verdict::NoDaemon, vec![]).contains("dynocar run"));
-    }
-}
+mod tests;
