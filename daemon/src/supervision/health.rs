@@ -101,12 +101,11 @@ impl PipelineHealth {
             Some(Reason::None) => String::new(),
             reason => format!(" ({})", reason.map_or("unknown", Reason::name)),
         };
+        let ends = |state: UseState| state.ends(self.reason, PipelineKind::from_name(self.kind));
         let of_quantity = |quantity: Quantity, state: UseState, why: &str| match state {
             UseState::Usable => format!("; {quantity} usable"),
-            _ if why == state.name() => {
-                format!("; {quantity} {state}: {}", state.ends(self.reason))
-            }
-            _ => format!("; {quantity} {state} ({why}): {}", state.ends(self.reason)),
+            _ if why == state.name() => format!("; {quantity} {state}: {}", ends(state)),
+            _ => format!("; {quantity} {state} ({why}): {}", ends(state)),
         };
         let uses =
             self.uses.iter().map(|&(quantity, state, why)| of_quantity(quantity, state, why));

@@ -28,7 +28,11 @@ fn a_train_that_learns_nothing_for_lack_of_a_quantity_is_degraded() {
         uses: vec![(Quantity::Mass, UseState::Learning, "missing_quantity")],
         ..starved()
     };
-    assert!(words.in_words().ends_with("(missing_quantity): it ends with its reason"));
+    assert!(
+        words
+            .in_words()
+            .ends_with("(missing_quantity): samples with a position and a brake force end it")
+    );
 }
 
 fn pipeline(reason: Reason) -> PipelineHealth {

@@ -39,7 +39,7 @@ Tab, Shift-Tab    next train, train before
 
 ± is a 95 % interval. A controller may use what is usable; learning is not known
 yet; confirming is known and has to hold without doubt, 2 s at first, after
-doubts up to 10 min; doubted ends with its reason; unavailable has no values.
+doubts up to 10 min; doubted is contradicted; unavailable has no values.
 What each reason means and asks for: docs/guides/reading.md.
 
 Unexplained is the force that the model lacks, retarding positive. Evidence is
