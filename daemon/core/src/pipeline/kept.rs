@@ -4,7 +4,7 @@
 //! stored values until its own samples have confirmed them. One that was in use moments ago goes on.
 
 use dynocar_shared::snapshot::{PARAMETERS_MAX, packed_index};
-use dynocar_shared::{Parameter, ParameterSnapshot, Status};
+use dynocar_shared::{Parameter, ParameterSnapshot, Reason, Status};
 use nalgebra::{Cholesky, DMatrix, SMatrix, SVector};
 
 use super::judge::{are_alike, are_too_large};
@@ -102,14 +102,20 @@ impl KeptEstimate {
         if kept.is_sound() { Ok(kept) } else { Err(NotKept::NotSound) }
     }
 
-    /// Takes the estimate of a snapshot, if it is validated: status estimated, innovations as
-    /// large and as white as the covariance says.
+    /// Takes the estimate of a snapshot, if it is validated: status estimated, or some quantities usable while others are
+    /// being learned, innovations as large and as white as the covariance says.
     ///
     /// # Errors
     ///
     /// Why it is not.
     pub fn from_snapshot(snapshot: &ParameterSnapshot) -> Result<Self, NotKept> {
-        if snapshot.status() != Status::Estimated {
+        let is_learning = snapshot.status() == Status::Unestimated
+            && matches!(
+                snapshot.reason(),
+                Some(Reason::WeakExcitation | Reason::LoadMayHaveChanged)
+            );
+        let is_known_in_part = is_learning && snapshot.usable_quantities != 0;
+        if snapshot.status() != Status::Estimated && !is_known_in_part {
             return Err(NotKept::Status(snapshot.status()));
         }
         let mean_square = snapshot.innovation_mean_square;
@@ -222,6 +228,8 @@ fn wander(parameter: Parameter) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
+    use dynocar_shared::Quantity;
+
     use super::*;
 
     fn snapshot() -> ParameterSnapshot {
@@ -244,6 +252,21 @@ mod tests {
             other.status = status as u32;
             assert_eq!(KeptEstimate::from_snapshot(&other), Err(NotKept::Status(status)));
         }
+        let mut learning = snapshot();
+        learning.status = Status::Unestimated as u32;
+        learning.usable_quantities = Quantity::Mass.bit();
+        for (reason, is_kept) in [
+            (Reason::WeakExcitation, true),
+            (Reason::LoadMayHaveChanged, true),
+            (Reason::EstimateStale, false),
+            (Reason::BadInput, false),
+        ] {
+            learning.reason = reason as u32;
+            let kept = KeptEstimate::from_snapshot(&learning);
+            assert_eq!(kept.is_ok(), is_kept, "{reason}");
+        }
+        (learning.reason, learning.usable_quantities) = (Reason::WeakExcitation as u32, 0);
+        assert!(KeptEstimate::from_snapshot(&learning).is_err(), "nothing is usable");
         let mut coloured = snapshot();
         coloured.innovation_correlation = 0.6;
         assert!(matches!(KeptEstimate::from_snapshot(&coloured), Err(NotKept::NotWhite { .. })));

@@ -119,6 +119,24 @@ fn what_was_in_use_goes_on_with_the_first_sample_unless_minutes_have_passed() {
 }
 
 #[test]
+fn a_mass_that_is_known_before_the_resistance_outlives_a_restart() {
+    let mut before = driven(&mut estimator(), 0, 10);
+    let reason = before.reason();
+    assert_eq!((before.status(), reason), (Status::Unestimated, Some(Reason::WeakExcitation)));
+    (before.sample_time_ns, before.usable_quantities) = (10_000_000_000, Quantity::Mass.bit());
+    let kept = KeptEstimate::from_snapshot(&before).unwrap();
+    let mut warm = estimator();
+    assert!(warm.warm_start(&kept.after(1.5)));
+    let sample = ResolvedSample { time_ns: 11_000_000_000, ..ResolvedSample::coasting() };
+    let (mut admission, mut snapshot) = (admission(), ParameterSnapshot::empty());
+    admission.pass(&mut warm, &sample);
+    assert_eq!(admission.write(&warm, &mut snapshot), Some(Quantity::Mass.bit()));
+    let std_t = |it: &ParameterSnapshot| it.covariance[packed_index(3, 3)].sqrt();
+    assert!((snapshot.values[3] / before.values[3] - 1.0).abs() < 1e-3);
+    assert!(std_t(&snapshot) < 1.05 * std_t(&before), "{} t", std_t(&snapshot));
+}
+
+#[test]
 fn a_brake_that_exerts_less_than_reported_leaves_the_mass_right() {
     for share in [0.9, 0.5] {
         let mut estimator = estimator();
