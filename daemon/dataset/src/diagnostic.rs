@@ -73,7 +73,9 @@ pub(super) fn concerned(fault: InputFault) -> (&'static [Quantity], &'static str
         InputFault::ForcesSwapped | InputFault::ForcesScale | InputFault::TractionScale => {
             (&[TractionForce, BrakeForce, ControlForce], "kN")
         }
-        InputFault::GradientSign | InputFault::GradientScale => (&[Gradient], "permille"),
+        InputFault::GradientSign | InputFault::GradientScale | InputFault::GradientAlongTravel => {
+            (&[Gradient], "permille")
+        }
         InputFault::PressureScale => (&[BrakeCylinderPressure], "Pa"),
     }
 }

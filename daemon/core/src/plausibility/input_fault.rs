@@ -58,6 +58,8 @@ named! {
         GradientScale = 11 "gradient_scale";
         /// Brake-cylinder pressure in another unit.
         PressureScale = 12 "pressure_scale";
+        /// The gradient is right in one direction of travel and reversed in the other.
+        GradientAlongTravel = 13 "gradient_along_travel";
     }
 }
 
@@ -114,7 +116,7 @@ impl InputFault {
             PositionScale | DirectionReversed => Dimension::Length,
             MassScale => Dimension::Mass,
             ForcesSwapped | ForcesScale | TractionScale | BrakeScale => Dimension::Force,
-            GradientSign | GradientScale => Dimension::Ratio,
+            GradientSign | GradientScale | GradientAlongTravel => Dimension::Ratio,
             PressureScale => Dimension::Pressure,
         }
     }
@@ -157,6 +159,11 @@ impl DetectedFault {
     /// Returns the detected fault in words; `read_as` is the unit that the quantity was read in.
     pub fn words(&self, read_as: &Unit) -> String {
         self.words_for((self.factor, self.factor), read_as)
+    }
+
+    /// Returns whether the forces may as well be right and the mass wrong.
+    fn may_be_mass(&self) -> bool {
+        self.fault == InputFault::ForcesScale && self.factor.ln().abs() < MASS_FACTOR_MAX.ln()
     }
 
     /// Returns the same for factors of several runs, from the lowest to the highest.
@@ -206,6 +213,11 @@ impl DetectedFault {
                         gradient or of direction right?"
                     .into();
             }
+            InputFault::GradientAlongTravel => {
+                return "the gradient is right in one direction of travel and reversed in the other: is \
+                        it given along the travel, not along the chainage?"
+                    .into();
+            }
             InputFault::GradientScale => {
                 format!("gradients look {size} for how the train accelerates")
             }
@@ -217,9 +229,7 @@ impl DetectedFault {
             Some(unit) => format!("is the unit {} and not {}", unit.name(), read_as.name()),
             None => format!("is the unit {} right", read_as.name()),
         };
-        let may_be_mass =
-            self.fault == InputFault::ForcesScale && self.factor.ln().abs() < MASS_FACTOR_MAX.ln();
-        let or_mass = if may_be_mass { ", or the mass wrong" } else { "" };
+        let or_mass = if self.may_be_mass() { ", or the mass wrong" } else { "" };
         format!("{what}: {question}{or_mass}?")
     }
 }

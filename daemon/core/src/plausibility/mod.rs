@@ -126,10 +126,14 @@ fn is_outside(value: f64, (low, high): (f64, f64)) -> bool {
 
 /// Returns the input fault that explains how position and speed go together.
 fn kinematic(figures: &Figures) -> Option<DetectedFault> {
-    let ratio = figures.distance_ratio?;
-    if (-DISTANCE_RATIOS.1..-DISTANCE_RATIOS.0).contains(&ratio) {
-        return Some(DetectedFault { fault: InputFault::DirectionReversed, factor: ratio });
+    let reversed = DetectedFault {
+        fault: InputFault::DirectionReversed,
+        factor: figures.reversed_ratio.or(figures.distance_ratio)?,
+    };
+    if !is_outside(-reversed.factor, DISTANCE_RATIOS) {
+        return Some(reversed);
     }
+    let ratio = figures.distance_ratio?;
     let factor = 1.0 / ratio.abs();
     if factor < STUCK_FACTOR {
         return Some(DetectedFault { fault: InputFault::SpeedScale, factor });
@@ -220,6 +224,13 @@ fn blamed(figures: &Figures, common: f64) -> (InputFault, f64) {
 }
 
 fn of_gradient(figures: &Figures, by: f64, found: &mut DetectedFaults) {
+    let is_right = |slope: f64| !is_outside(slope / by, DISTANCE_RATIOS);
+    if let [Some(forth), Some(back)] = figures.gradients_by_direction
+        && (is_right(forth) && is_right(-back) || is_right(-forth) && is_right(back))
+    {
+        add(found, InputFault::GradientAlongTravel, forth.min(back) / by);
+        return;
+    }
     let Some(slope) = figures.slopes.gradient else { return };
     let factor = slope / by;
     if factor < 0.0 {
@@ -324,6 +335,35 @@ mod tests {
             };
             assert!(words.starts_with("the position stands still"), "{words}");
         }
+    }
+
+    #[test]
+    fn a_gradient_that_is_right_in_one_direction_only_is_given_along_the_travel() {
+        let slopes = Slopes { gradient: Some(-0.9), ..Slopes::default() };
+        for (by_direction, expected) in [
+            ([Some(1.0), Some(-0.95)], InputFault::GradientAlongTravel),
+            ([Some(-1.1), Some(1.0)], InputFault::GradientAlongTravel),
+            ([None, Some(-0.95)], InputFault::GradientSign),
+            ([Some(-1.0), Some(-0.95)], InputFault::GradientSign),
+        ] {
+            let gradients_by_direction = by_direction;
+            let figures = Figures { slopes, gradients_by_direction, ..Figures::default() };
+            let faults: Vec<InputFault> = found(figures).into_iter().map(|it| it.0).collect();
+            assert_eq!(faults, [expected], "{by_direction:?}");
+        }
+    }
+
+    #[test]
+    fn a_position_that_falls_is_named_whatever_the_way_before() {
+        let figures = |distance_ratio, reversed_ratio| Figures {
+            distance_ratio,
+            reversed_ratio,
+            ..Figures::default()
+        };
+        for figures in [figures(Some(1.0), Some(-0.97)), figures(None, Some(-1.1))] {
+            assert_eq!(found(figures)[0].0, InputFault::DirectionReversed);
+        }
+        assert!(found(figures(Some(1.0), None)).is_empty());
     }
 
     #[test]

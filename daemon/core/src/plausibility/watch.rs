@@ -24,6 +24,11 @@ const COMPARED_M: f64 = 200.0;
 /// Comparisons of position and speed that the median looks back over, and that are enough.
 const RATIOS: usize = 21;
 const RATIOS_MIN: usize = 5;
+/// Distance in m over which the position is seen to run against the stated direction, and the times in a row.
+const REVERSED_M: f64 = 50.0;
+const REVERSED_MIN: u32 = 2;
+/// Distance by position over distance by speed below which the position runs the other way, and is not only noise.
+const REVERSED_RATIO: f64 = -0.5;
 /// The greatest share of the effort curve loses this share with each window.
 const EFFORT_FADE: f64 = 1.0 / 400.0;
 /// Windows with a mass that are enough to judge it.
@@ -34,8 +39,12 @@ const MASSES_MIN: f64 = 5.0;
 pub struct Figures {
     /// Acceleration over the acceleration that the forces and the gradient would give.
     pub slopes: Slopes,
+    /// The gradient's factor while the chainage grows and while it falls.
+    pub gradients_by_direction: [Option<f64>; 2],
     /// Distance by position, counted in the direction of travel, over distance by speed.
     pub distance_ratio: Option<f64>,
+    /// The same over the newest distance, where the position runs against the stated direction.
+    pub reversed_ratio: Option<f64>,
     /// Reported over declared mass.
     pub mass_ratio: Option<f64>,
     /// Greatest traction and brake force lately as shares of their effort curves.
@@ -67,6 +76,23 @@ struct Distances {
     by_speed_m: f64,
 }
 
+impl Distances {
+    fn add(&mut self, by_position_m: f64, by_speed_m: f64) {
+        self.by_position_m += by_position_m;
+        self.by_speed_m += by_speed_m;
+    }
+
+    /// Returns the ratio of the two, and begins anew, once one of them is so long.
+    fn over(&mut self, length_m: f64) -> Option<f64> {
+        let Distances { by_position_m, by_speed_m } = *self;
+        if by_speed_m.max(by_position_m.abs()) < length_m {
+            return None;
+        }
+        *self = Distances::default();
+        Some(by_position_m / by_speed_m)
+    }
+}
+
 /// Follows the samples of one train; of fixed size.
 #[derive(Clone, Debug)]
 pub struct PlausibilityWatch {
@@ -81,7 +107,12 @@ pub struct PlausibilityWatch {
     pub ended: Option<WindowMean>,
     distances: Distances,
     balance: WindowBalance,
+    /// The windows while the chainage grows and while it falls.
+    by_direction: [WindowBalance; 2],
     distance_ratios: RunningMedian<RATIOS>,
+    short_distances: Distances,
+    reversed_in_a_row: u32,
+    reversed_ratio: f64,
     masses: f64,
     mass_ratio: f64,
     effort_shares: [f64; 2],
@@ -101,7 +132,11 @@ impl PlausibilityWatch {
             ended: None,
             distances: Distances::default(),
             balance: WindowBalance::default(),
+            by_direction: Default::default(),
             distance_ratios: RunningMedian::default(),
+            short_distances: Distances::default(),
+            reversed_in_a_row: 0,
+            reversed_ratio: 0.0,
             masses: 0.0,
             mass_ratio: 1.0,
             effort_shares: [0.0; 2],
@@ -157,6 +192,8 @@ impl PlausibilityWatch {
         let share = |share: f64| (share > 0.0).then_some(share);
         Figures {
             slopes: self.balance.slopes(),
+            gradients_by_direction: self.by_direction.map(|balance| balance.slopes().gradient),
+            reversed_ratio: self.is_reversed().then_some(self.reversed_ratio),
             distance_ratio: if self.distance_ratios.count() >= RATIOS_MIN {
                 self.distance_ratios.median()
             } else {
@@ -173,8 +210,15 @@ impl PlausibilityWatch {
     fn begin(&mut self) {
         self.window = Window::default();
         self.distances = Distances::default();
+        self.short_distances = Distances::default();
     }
 
+    fn is_reversed(&self) -> bool {
+        self.reversed_in_a_row >= REVERSED_MIN
+    }
+
+    /// Compares position and speed; true when a comparison is complete. A position that runs against the stated
+    /// direction shows at once, one in another unit by the median, which the other direction does not enter.
     fn compare_distances(&mut self, last: &TrainSample, now: &TrainSample, step_s: f64) -> bool {
         let (Some(from_m), Some(to_m), true) = (
             last.get(SampleField::Position),
@@ -182,17 +226,24 @@ impl PlausibilityWatch {
             self.is_position_measured,
         ) else {
             self.distances = Distances::default();
+            self.short_distances = Distances::default();
             return false;
         };
-        self.distances.by_position_m += f64::from(now.direction) * (to_m - from_m);
-        self.distances.by_speed_m += 0.5 * (last.speed_mps + now.speed_mps) * step_s;
-        let Distances { by_position_m, by_speed_m } = self.distances;
-        if by_speed_m.max(by_position_m.abs()) < COMPARED_M {
-            return false;
+        let by_position_m = f64::from(now.direction) * (to_m - from_m);
+        let by_speed_m = 0.5 * (last.speed_mps + now.speed_mps) * step_s;
+        self.distances.add(by_position_m, by_speed_m);
+        self.short_distances.add(by_position_m, by_speed_m);
+        let short = self.short_distances.over(REVERSED_M);
+        if let Some(ratio) = short {
+            let is_reversed = ratio < REVERSED_RATIO;
+            self.reversed_in_a_row = if is_reversed { self.reversed_in_a_row + 1 } else { 0 };
+            self.reversed_ratio = ratio;
         }
-        self.distance_ratios.push(by_position_m / by_speed_m);
-        self.distances = Distances::default();
-        true
+        if let Some(ratio) = self.distances.over(COMPARED_M).filter(|_| !self.is_reversed()) {
+            self.distance_ratios.push(ratio);
+            return true;
+        }
+        short.is_some()
     }
 
     fn extend_window(&mut self, last: &TrainSample, now: &TrainSample, step_s: f64) -> bool {
@@ -224,15 +275,15 @@ impl PlausibilityWatch {
         if window.refused_s > 0.0 && window.refused_s < REFUSED_SHARE_MIN * window.elapsed_s {
             return false;
         }
-        self.close(window, now.speed_mps, mass_kg);
+        self.close(window, now, mass_kg);
         true
     }
 
-    fn close(&mut self, window: Window, end_mps: f64, mass_kg: f64) {
+    fn close(&mut self, window: Window, end: &TrainSample, mass_kg: f64) {
         let per_s = 1.0 / window.elapsed_s;
         let mean = WindowMean {
             inertia_mps2: (1.0 + self.train.rotating_mass_factor)
-                * (end_mps - window.start_mps)
+                * (end.speed_mps - window.start_mps)
                 * per_s,
             traction_mps2: window.traction_mps * per_s,
             brake_mps2: window.brake_mps * per_s,
@@ -240,6 +291,7 @@ impl PlausibilityWatch {
             speed_mps: window.travelled_m * per_s,
         };
         self.balance.push(&mean);
+        self.by_direction[usize::from(end.direction < 0)].push(&mean);
         self.ended = Some(mean);
         self.masses += 1.0;
         self.mass_ratio = mass_kg / self.train.mass_kg;
@@ -317,3 +369,6 @@ impl PressureContrast {
         follows.then(|| self.braking.value())
     }
 }
+
+#[cfg(test)]
+mod tests;
