@@ -157,7 +157,8 @@ enum {
     DYNOCAR_REASON_NOT_IDENTIFIABLE = 13,
     /* The daemon has not been heard of lately; set by the client, never by the daemon */
     DYNOCAR_REASON_DAEMON_SILENT = 14,
-    /* Forces that cannot be true: a wrong unit, exchanged, of the wrong sign */
+    /* Forces that cannot be true: a wrong unit, exchanged, of the wrong sign, refreshed too
+     * seldom */
     DYNOCAR_REASON_IMPLAUSIBLE_FORCES = 15,
     /* Speed, position, time or direction that contradict each other: a wrong unit or sign */
     DYNOCAR_REASON_IMPLAUSIBLE_MOTION = 16,

@@ -211,7 +211,7 @@ vocabulary! {
         NotIdentifiable = 13 "not_identifiable",
         /// The daemon has not been heard of lately; set by the client, never by the daemon.
         DaemonSilent = 14 "daemon_silent",
-        /// Forces that cannot be true: a wrong unit, exchanged, of the wrong sign.
+        /// Forces that cannot be true: a wrong unit, exchanged, of the wrong sign, refreshed too seldom.
         ImplausibleForces = 15 "implausible_forces",
         /// Speed, position, time or direction that contradict each other: a wrong unit or sign.
         ImplausibleMotion = 16 "implausible_motion",

@@ -98,7 +98,7 @@ class Reason(_Vocabulary):
     ONLY_LOWER_BOUND = 12  # Only a lower bound can be had from these data
     NOT_IDENTIFIABLE = 13  # The same data fit other values of the parameters as well
     DAEMON_SILENT = 14  # The daemon has not been heard of lately; set by the client, never by the daemon
-    IMPLAUSIBLE_FORCES = 15  # Forces that cannot be true: a wrong unit, exchanged, of the wrong sign
+    IMPLAUSIBLE_FORCES = 15  # Forces that cannot be true: a wrong unit, exchanged, of the wrong sign, refreshed too seldom
     IMPLAUSIBLE_MOTION = 16  # Speed, position, time or direction that contradict each other: a wrong unit or sign
     IMPLAUSIBLE_MASS = 17  # A mass that cannot be true: a wrong unit
     IMPLAUSIBLE_GRADIENT = 18  # A gradient that cannot be true: a wrong unit or sign

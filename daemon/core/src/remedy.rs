@@ -27,7 +27,7 @@ pub const fn of_reason(reason: Reason) -> &'static str {
         }
         Reason::NumericalFailure => "wait, it learns anew; report it when it comes back",
         Reason::DaemonSilent => "look whether the daemon runs, and start it",
-        Reason::ImplausibleForces => "forces cannot be true: check their unit, sign and order",
+        Reason::ImplausibleForces => "forces cannot be true: check their unit, sign, order and age",
         Reason::ImplausibleMotion => {
             "speed, position or time cannot be true: check units and signs"
         }

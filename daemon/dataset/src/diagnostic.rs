@@ -70,9 +70,10 @@ pub(super) fn concerned(fault: InputFault) -> (&'static [Quantity], &'static str
         InputFault::PositionScale | InputFault::DirectionReversed => (&[Position], "m"),
         InputFault::MassScale => (&[TrainMass], "t"),
         InputFault::BrakeScale => (&[BrakeForce, ControlForce], "kN"),
-        InputFault::ForcesSwapped | InputFault::ForcesScale | InputFault::TractionScale => {
-            (&[TractionForce, BrakeForce, ControlForce], "kN")
-        }
+        InputFault::ForcesSwapped
+        | InputFault::ForcesScale
+        | InputFault::TractionScale
+        | InputFault::ForcesStale => (&[TractionForce, BrakeForce, ControlForce], "kN"),
         InputFault::GradientSign | InputFault::GradientScale | InputFault::GradientAlongTravel => {
             (&[Gradient], "permille")
         }

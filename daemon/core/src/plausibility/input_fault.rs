@@ -60,6 +60,8 @@ named! {
         PressureScale = 12 "pressure_scale";
         /// The gradient is right in one direction of travel and reversed in the other.
         GradientAlongTravel = 13 "gradient_along_travel";
+        /// Forces that are refreshed seldom, or frozen.
+        ForcesStale = 14 "forces_stale";
     }
 }
 
@@ -69,10 +71,11 @@ impl InputFault {
         Self::ALL.into_iter().find(|fault| *fault as u8 == number)
     }
 
-    /// Returns how much it matters: the pressure enters no balance of forces.
+    /// Returns how much it matters: the pressure enters no balance of forces, and forces that are stale now and then are
+    /// true in between.
     pub const fn severity(self) -> Severity {
         match self {
-            InputFault::PressureScale => Severity::Warning,
+            InputFault::PressureScale | InputFault::ForcesStale => Severity::Warning,
             _ => Severity::Fundamental,
         }
     }
@@ -115,7 +118,9 @@ impl InputFault {
             SpeedScale => Dimension::Speed,
             PositionScale | DirectionReversed => Dimension::Length,
             MassScale => Dimension::Mass,
-            ForcesSwapped | ForcesScale | TractionScale | BrakeScale => Dimension::Force,
+            ForcesSwapped | ForcesScale | TractionScale | BrakeScale | ForcesStale => {
+                Dimension::Force
+            }
             GradientSign | GradientScale | GradientAlongTravel => Dimension::Ratio,
             PressureScale => Dimension::Pressure,
         }
@@ -211,6 +216,11 @@ impl DetectedFault {
             InputFault::GradientSign => {
                 return "the train speeds up where the gradient climbs: is the sign of the \
                         gradient or of direction right?"
+                    .into();
+            }
+            InputFault::ForcesStale => {
+                return "the train goes to its next force before that is reported: are the forces refreshed \
+                        too seldom, or frozen?"
                     .into();
             }
             InputFault::GradientAlongTravel => {

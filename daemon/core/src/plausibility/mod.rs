@@ -4,7 +4,8 @@
 //!
 //! # Layout, in the order of the work
 //!
-//! - `watch`: sample by sample, with [`window_balance`] (forces against acceleration)
+//! - `watch`: sample by sample, with [`window_balance`] (forces against acceleration) and `held_forces` (forces that are
+//!   refreshed seldom)
 //! - [`DetectedFaults`]: which input fault makes all figures come out as they did
 //! - [`input_fault`]: the input faults, their names, severity and words
 //!
@@ -19,6 +20,7 @@
 //! | position | 1 | f | not known |
 //! | traction and brake exchanged | -1 | 1 | 1 |
 
+mod held_forces;
 pub mod input_fault;
 pub(crate) mod watch;
 pub mod window_balance;
@@ -109,6 +111,9 @@ pub fn diagnose(figures: &Figures) -> DetectedFaults {
         forces_by *= ratio;
     }
     of_forces(figures, forces_by, &mut found);
+    if figures.are_forces_stale && found.is_empty() {
+        add(&mut found, InputFault::ForcesStale, 1.0);
+    }
     if kinematic.is_none() {
         of_gradient(figures, gradients_by, &mut found);
     }

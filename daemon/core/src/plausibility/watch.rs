@@ -6,6 +6,7 @@ use dynocar_model::train::TrainModel;
 use dynocar_shared::resistance::GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainSample};
 
+use super::held_forces::{ForcesNow, HeldForces};
 use super::window_balance::{Slopes, WindowBalance, WindowMean};
 use crate::filter::RunningMedian;
 
@@ -47,6 +48,8 @@ pub struct Figures {
     pub reversed_ratio: Option<f64>,
     /// Reported over declared mass.
     pub mass_ratio: Option<f64>,
+    /// True where the train goes to its next force before that is reported.
+    pub are_forces_stale: bool,
     /// Greatest traction and brake force lately as shares of their effort curves.
     pub effort_shares: [Option<f64>; 2],
     /// Brake-cylinder pressure in Pa while braking, where it follows the brake.
@@ -116,6 +119,7 @@ pub struct PlausibilityWatch {
     masses: f64,
     mass_ratio: f64,
     effort_shares: [f64; 2],
+    held_forces: HeldForces,
     pressure: PressureContrast,
 }
 
@@ -140,6 +144,7 @@ impl PlausibilityWatch {
             masses: 0.0,
             mass_ratio: 1.0,
             effort_shares: [0.0; 2],
+            held_forces: HeldForces::default(),
             pressure: PressureContrast::default(),
         }
     }
@@ -184,7 +189,26 @@ impl PlausibilityWatch {
             self.window.refused_s += step_s;
         }
         let is_compared = self.compare_distances(&last, sample, step_s);
-        self.extend_window(&last, sample, step_s) || is_compared
+        let is_held = self.follow_forces(sample, step_s);
+        self.extend_window(&last, sample, step_s) || is_compared || is_held
+    }
+
+    /// Follows forces that stay the same; true when they changed after a while.
+    fn follow_forces(&mut self, now: &TrainSample, step_s: f64) -> bool {
+        let Some((traction_n, brake_n)) = forces_n(now).filter(|_| self.is_moving(now)) else {
+            self.held_forces.interrupt();
+            return false;
+        };
+        let mass_kg = now.get(SampleField::Mass).unwrap_or(self.train.mass_kg);
+        let (traction_mps2, brake_mps2) = (traction_n / mass_kg, brake_n / mass_kg);
+        let now = ForcesNow { speed_mps: now.speed_mps, traction_mps2, brake_mps2 };
+        self.held_forces.take(now, step_s)
+    }
+
+    /// Returns whether a train moves on wheels that neither slide nor spin.
+    fn is_moving(&self, sample: &TrainSample) -> bool {
+        let is_sliding = sample.flags & dynocar_shared::sample::FLAG_WHEEL_SLIDE != 0;
+        sample.speed_mps >= MOVING_MPS && !is_sliding
     }
 
     /// Returns the figures of the samples so far.
@@ -200,6 +224,7 @@ impl PlausibilityWatch {
                 None
             },
             mass_ratio: (self.masses >= MASSES_MIN).then_some(self.mass_ratio),
+            are_forces_stale: self.held_forces.are_stale(),
             effort_shares: self.effort_shares.map(share),
             braking_pressure_pa: self.pressure.braking_pa(),
             gradient_rms_permille: self.balance.gradient_rms_permille(),
@@ -211,6 +236,7 @@ impl PlausibilityWatch {
         self.window = Window::default();
         self.distances = Distances::default();
         self.short_distances = Distances::default();
+        self.held_forces.interrupt();
     }
 
     fn is_reversed(&self) -> bool {
@@ -251,8 +277,7 @@ impl PlausibilityWatch {
             self.window = Window::default();
             return false;
         };
-        let is_sliding = now.flags & dynocar_shared::sample::FLAG_WHEEL_SLIDE != 0;
-        if last.speed_mps < MOVING_MPS || now.speed_mps < MOVING_MPS || is_sliding {
+        if last.speed_mps < MOVING_MPS || !self.is_moving(now) {
             self.window = Window::default();
             return false;
         }

@@ -109,7 +109,7 @@ fn what_to_do_follows_what_is_known_best() {
         suspicion: Suspicion::from_snapshot(&snapshot),
         ..pipeline(Reason::ImplausibleForces)
     };
-    assert!(degraded(vec![fine, faults]).contains("unit, sign and order"));
+    assert!(degraded(vec![fine, faults]).contains("unit, sign, order and age"));
     let starved =
         PipelineHealth { status: Status::Unestimated, ..pipeline(Reason::MissingQuantity) };
     assert!(degraded(vec![starved]).contains("send what the pipeline needs"));
